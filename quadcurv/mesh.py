@@ -1,0 +1,575 @@
+"""Meshes, checked once and frozen, and the one-ring stencils that every scheme reads."""
+
+from __future__ import annotations
+
+import operator
+import warnings
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy import sparse
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int32]
+Bools = NDArray[np.bool_]
+
+
+class MeshError(ValueError):
+    """What is wrong with a mesh: which argument, where first (face or vertex), and how often."""
+
+
+class CornerTable(NamedTuple):
+    """One-ring stencils: the corners (c, a, d, b) around every vertex, in CSR form.
+
+    Corners ``indptr[c]:indptr[c + 1]`` are those of vertex c, counter-clockwise; at a boundary vertex
+    they begin at the boundary edge. Faces that run against their neighbours are turned.
+
+    Attributes
+    ----------
+    indptr : (n + 1,) int64
+    centre : (k,) int32
+        The vertex c itself.
+    next : (k,) int32
+        The next edge neighbour a.
+    diagonal : (k,) int32
+        The vertex d across the quad, -1 in a triangle.
+    previous : (k,) int32
+        The previous edge neighbour b; in a closed ring it is the next corner's a.
+    """
+
+    indptr: NDArray[np.int64]
+    centre: Ints
+    next: Ints
+    diagonal: Ints
+    previous: Ints
+
+
+@dataclass(frozen=True, eq=False)
+class Stencils:
+    """What a scheme reads: faces over points, and which of the points want a curvature.
+
+    Attributes
+    ----------
+    points : (p, 3) float64
+        Positions: first the n vertices with a stencil, then ghosts and dual points.
+    faces : (m, 4) int32
+        Counter-clockwise faces over `points`; a triangle's last entry is -1.
+    shape : tuple of int
+        Shape of a result, (n,) or (r, c) with r c = n.
+    closed : (n,) bool
+        Whether the ring is one closed fan; elsewhere no curvature is known.
+    orientable : bool
+        False where no choice of sides agrees; normals then have an arbitrary sign.
+    """
+
+    points: Floats
+    faces: Ints
+    shape: tuple[int, ...]
+    closed: Bools
+    orientable: bool = True
+
+    @property
+    def n(self) -> int:
+        """Number of vertices with a stencil."""
+        return int(np.prod(self.shape))
+
+    @property
+    def has_triangles(self) -> bool:
+        """Whether any face is a triangle."""
+        return bool((self.faces[:, 3] < 0).any())
+
+    @property
+    def valence(self) -> Ints:
+        """(n,) int32: number of faces at each vertex."""
+        count = np.bincount(self.faces[self.faces >= 0], minlength=len(self.points))
+        return count[: self.n].astype(np.int32)
+
+    @cached_property
+    def ring_areas(self) -> Floats:
+        """(n, 3) float64: half the vector area of each ring polygon; it points along the normal."""
+        from quadcurv.kernels import diamond
+
+        if self.orientable:
+            normal = np.zeros_like(self.points)
+            diamond.ring_normals(self.points, self.faces, normal)
+            return normal[: self.n]
+        # Faces disagree somewhere: the corner table has each ring turned one way.
+        indptr, c, a, _, b = self.corner_table
+        corner = np.cross(self.points[a] - self.points[c], self.points[b] - self.points[c])
+        sums = sparse.csr_array((np.full(c.size, 0.25), np.arange(c.size), indptr), (self.n, c.size))
+        return sums @ corner
+
+    @cached_property
+    def corner_table(self) -> CornerTable:
+        """Corners of the n vertices, ring by ring."""
+        from quadcurv.kernels import topology
+
+        indptr, corners = topology.corners_by_vertex(self.faces, len(self.points))
+        _, flipped, *_ = topology.order_rings(self.faces, indptr, corners)
+        indptr = indptr[: self.n + 1]
+        face, slot = np.divmod(corners[: indptr[-1]], 4)
+        quad = self.faces[face, 3] >= 0
+        sides = np.where(quad, 4, 3)
+        turn = np.where(flipped[: indptr[-1]], -1, 1)
+
+        def vertex(step: Any) -> Ints:
+            return self.faces[face, (slot + step) % sides]
+
+        return CornerTable(
+            indptr,
+            vertex(0),
+            vertex(turn),
+            np.where(quad, vertex(2), np.int32(-1)),
+            vertex(-turn),
+        )
+
+
+class QuadMesh:
+    """Quads, or quads and triangles, over points.
+
+    Parameters
+    ----------
+    points : (n, 3) array_like of float
+        Positions. C-contiguous float64 is not copied but seen read-only; all else is converted.
+        float32 is accepted and computed with in float64, yet its rounding, eps / h^2 in a curvature,
+        stays.
+    faces : (m, 4) or (m, 3) array_like of int, or sequence of polygons
+        Vertex indices, counter-clockwise. In an (m, 4) array a last entry of -1 marks a triangle.
+        A polygon of more than four sides is split into triangles: by ear clipping, or as a fan where it
+        crosses itself seen along its vector area.
+
+    Attributes
+    ----------
+    points : (n, 3) float64, read-only
+    faces : (m, 4) int32, read-only
+        The faces computed with; a triangle's last entry is -1.
+    face_source : (m,) int64
+        The index of the given face that each of `faces` stems from.
+    n_split : int
+        How many polygons of more than four sides were split.
+    n_flipped : int
+        How many faces were turned so that neighbours agree.
+    orientable : bool
+        False for a mesh such as a Moebius strip; its mean curvature is given without sign.
+
+    Raises
+    ------
+    MeshError
+        A ValueError: wrong shapes, non-finite points, indices out of range or repeated in a face,
+        edges with more than two faces.
+
+    Warns
+    -----
+    UserWarning
+        The mesh is non-orientable.
+
+    Notes
+    -----
+    Vertices without a face and vertices where several fans touch are accepted: their curvature is NaN.
+    """
+
+    points: Floats
+    faces: Ints
+    face_source: NDArray[np.int64]
+    n_split: int
+    n_flipped: int
+    orientable: bool
+
+    def __init__(self, points: ArrayLike, faces: ArrayLike | Sequence[Sequence[int]]) -> None:
+        self.points = _checked_points(points, "points", ("n", 3))
+        self.faces, self.face_source, self.n_split = _checked_faces(faces, self.points)
+        self.n_flipped, self.orientable = 0, True
+        self._orient()
+        self.faces.flags.writeable = False
+
+    def __repr__(self) -> str:
+        triangles = int(np.count_nonzero(self.faces[:, 3] < 0))
+        kinds = f"{len(self.faces) - triangles} quads" + (f", {triangles} triangles" if triangles else "")
+        return f"QuadMesh({len(self.points)} points, {kinds})"
+
+    def _orient(self) -> None:
+        """Reject non-manifold edges; turn faces until neighbours agree, or find that they cannot."""
+        from quadcurv.kernels import topology
+
+        indptr, corners = topology.corners_by_vertex(self.faces, len(self.points))
+        kind, _, bad_edge, n_disagree = topology.order_rings(self.faces, indptr, corners)
+        if bad_edge[2]:
+            raise MeshError(
+                f"faces: {bad_edge[2]} edge(s) with more than two faces, "
+                f"first the one from vertex {bad_edge[0]} to {bad_edge[1]}"
+            )
+        if n_disagree:
+            turn, self.orientable = _consistent_sides(self.faces)
+            self.n_flipped = int(np.count_nonzero(turn))
+            quad = self.faces[:, 3] >= 0
+            self.faces[turn & quad] = self.faces[turn & quad][:, [0, 3, 2, 1]]
+            self.faces[turn & ~quad] = self.faces[turn & ~quad][:, [0, 2, 1, 3]]
+            corners = topology.corners_by_vertex(self.faces, len(self.points))[1]
+            kind, *_ = topology.order_rings(self.faces, indptr, corners)
+            if not self.orientable:
+                warnings.warn(
+                    "the mesh is non-orientable: its mean curvature has no sign, |H| is given",
+                    stacklevel=3,
+                )
+        self._kind = kind
+
+    def stencils(self) -> Stencils:
+        """One-ring stencils of the vertices as they are; rings at a boundary stay open."""
+        from quadcurv.kernels import topology
+
+        closed = self._kind == topology.INTERIOR
+        return Stencils(self.points, self.faces, (len(self.points),), closed, self.orientable)
+
+    def with_points(self, points: ArrayLike) -> QuadMesh:
+        """Return the same faces, not checked again, over other positions of the same shape."""
+        mesh = object.__new__(QuadMesh)
+        mesh.__dict__.update(self.__dict__)
+        mesh.points = _checked_points(points, "points", self.points.shape)
+        return mesh
+
+
+class QuadGrid:
+    """A logically Cartesian grid of vertices.
+
+    Parameters
+    ----------
+    points : (r, c, 3) array_like of float
+        Positions; the surface normal is that of the first direction times the second.
+    wrap : (bool, bool)
+        Whether the last row (column) is followed by the first, which is not repeated.
+
+    Raises
+    ------
+    MeshError
+        A ValueError: wrong shape, fewer than 2 points a direction (3 where it wraps), non-finite points.
+    """
+
+    def __init__(self, points: ArrayLike, wrap: Sequence[bool] = (False, False)) -> None:
+        self.wrap = _checked_wrap(wrap)
+        self.points = _checked_points(points, "points", ("r", "c", 3))
+        for axis, name in enumerate(("rows", "columns")):
+            least = 3 if self.wrap[axis] else 2
+            if self.points.shape[axis] < least:
+                raise MeshError(
+                    f"points: {self.points.shape[axis]} {name}, at least {least} are needed"
+                    + (" where the grid wraps" if self.wrap[axis] else "")
+                )
+
+    def __repr__(self) -> str:
+        return f"QuadGrid({self.shape[0]} x {self.shape[1]} points, wrap={self.wrap})"
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """Rows and columns of vertices."""
+        return self.points.shape[0], self.points.shape[1]
+
+    def stencils(self) -> Stencils:
+        """One-ring stencils of the vertices as they are; rings at open sides stay open."""
+        index = np.arange(self.shape[0] * self.shape[1], dtype=np.int32).reshape(self.shape)
+        index = np.pad(index, [(0, int(w)) for w in self.wrap], mode="wrap")
+        closed = np.ones(self.shape, bool)
+        if not self.wrap[0]:
+            closed[[0, -1]] = False
+        if not self.wrap[1]:
+            closed[:, [0, -1]] = False
+        return Stencils(self.points.reshape(-1, 3), grid_faces(index), self.shape, closed.ravel())
+
+    def to_mesh(self) -> QuadMesh:
+        """Return the same quads as a face list, vertices in row-major order."""
+        stencils = self.stencils()
+        return QuadMesh(stencils.points, stencils.faces)
+
+
+class StaggeredGrid:
+    """A grid of primal points (cell centres) and dual points (cell corners), as finite-volume codes have.
+
+    The stencil is that of the thesis's Figures 3.1 and 4.1: around a primal point its four dual corners
+    are the edge neighbours a, b and the four primal neighbours the vertices d across.
+
+    Parameters
+    ----------
+    primal : (r, c, 3) or (r + 2, c + 2, 3) array_like of float
+        Cell centres, without or with one layer of ghost cells around; the four corner ghosts are not read.
+    dual : (r + 1, c + 1, 3) array_like of float
+        Cell corners; dual[i, j] comes before primal[i, j] in both directions.
+    wrap : (bool, bool)
+        Whether the last row (column) of cells is followed by the first; only without ghost cells.
+        The last row (column) of dual then repeats the first.
+
+    Raises
+    ------
+    MeshError
+        A ValueError: wrong shapes, non-finite points, or a seam that does not meet.
+    """
+
+    def __init__(self, primal: ArrayLike, dual: ArrayLike, wrap: Sequence[bool] = (False, False)) -> None:
+        self.wrap = _checked_wrap(wrap)
+        self.dual = _checked_points(dual, "dual", ("r + 1", "c + 1", 3))
+        r, c = (self.dual.shape[0] - 1, self.dual.shape[1] - 1)
+        self.primal = _checked_points(primal, "primal", ("r", "c", 3))
+        if r < 1 or c < 1 or self.primal.shape[:2] not in ((r, c), (r + 2, c + 2)):
+            raise MeshError(
+                f"primal: shape {self.primal.shape} does not fit dual of shape {self.dual.shape}; "
+                f"expected {(r, c, 3)}, or {(r + 2, c + 2, 3)} with ghost cells"
+            )
+        if self.primal.shape[:2] == (r + 2, c + 2) and any(self.wrap):
+            raise MeshError("wrap: primal has ghost cells already, so no side is left to wrap")
+        self.shape = r, c
+        for axis, name in enumerate(("rows", "columns")):
+            if not self.wrap[axis]:
+                continue
+            if self.shape[axis] < 3:
+                raise MeshError(f"primal: {self.shape[axis]} {name}, at least 3 are needed to wrap")
+            gap = np.abs(self.dual.take(0, axis) - self.dual.take(-1, axis)).max()
+            if gap > 1e-9 * np.ptp(self.dual.reshape(-1, 3), axis=0).max():
+                raise MeshError(f"dual: first and last {name} differ by {gap:.3g} although they wrap")
+
+    def __repr__(self) -> str:
+        return f"StaggeredGrid({self.shape[0]} x {self.shape[1]} cells, wrap={self.wrap})"
+
+    @property
+    def has_ghosts(self) -> bool:
+        """Whether primal carries a layer of ghost cells."""
+        return self.primal.shape[:2] != self.shape
+
+    @classmethod
+    def from_mapping(
+        cls,
+        mapping: Callable[[Floats, Floats], ArrayLike],
+        xi: ArrayLike,
+        eta: ArrayLike,
+    ) -> StaggeredGrid:
+        """Sample a surface at cell corners and, midway between them, at cell centres.
+
+        Parameters
+        ----------
+        mapping : callable
+            (xi, eta) -> (..., 3), broadcasting.
+        xi, eta : (r + 3,), (c + 3,) array_like of float
+            Coordinates of the dual points, one ghost cell on each side included.
+        """
+        xi, eta = np.asarray(xi, float), np.asarray(eta, float)
+        for name, t in (("xi", xi), ("eta", eta)):
+            if t.ndim != 1 or t.size < 4:
+                raise MeshError(f"{name}: shape {t.shape}, expected (cells + 3,)")
+        centre_xi, centre_eta = (xi[1:] + xi[:-1]) / 2, (eta[1:] + eta[:-1]) / 2
+        return cls(
+            mapping(centre_xi[:, None], centre_eta[None, :]),
+            mapping(xi[1:-1, None], eta[None, 1:-1]),
+        )
+
+    def stencils(self) -> Stencils:
+        """Stencils of the cells as given; without ghost cells rings at open sides stay open."""
+        r, c = self.shape
+        index = np.full((r + 2, c + 2), -1, np.int32)
+        index[1:-1, 1:-1] = np.arange(r * c).reshape(r, c)
+        if self.has_ghosts:
+            index[index < 0] = np.arange(r * c, index.size)
+            ring = index >= r * c
+            return self.diamonds(index, self.primal[ring])
+        if self.wrap[0]:
+            index[[0, -1]] = index[[-2, 1]]
+        if self.wrap[1]:
+            index[:, [0, -1]] = index[:, [-2, 1]]
+        return self.diamonds(index, np.empty((0, 3)))
+
+    def diamonds(self, index: Ints, ghosts: Floats) -> Stencils:
+        """Stencils of the quads (primal, dual, primal, dual) across the edges of the cells.
+
+        Parameters
+        ----------
+        index : (r + 2, c + 2) int32
+            Indices of the cells with one layer around: row by row, from r c on ghosts, -1 for none.
+        ghosts : (g, 3) float64
+            Centres of the ghost cells.
+
+        Notes
+        -----
+        Across edges of the first direction the quads begin at a primal point, across those of the second
+        at a dual point, so that one choice of diagonal keeps two primal neighbours of each cell.
+        """
+        r, c = self.shape
+        centres = self.primal[1:-1, 1:-1] if self.has_ghosts else self.primal
+        dual = np.arange((r + 1) * (c + 1), dtype=np.int32).reshape(r + 1, c + 1)
+        dual += r * c + len(ghosts)
+        if self.wrap[0]:
+            dual[-1] = dual[0]
+        if self.wrap[1]:
+            dual[:, -1] = dual[:, 0]
+        p, q = index[:, 1:-1], index[1:-1]
+        first = np.stack((p[:-1], dual[:, :-1], p[1:], dual[:, 1:]), axis=-1)
+        second = np.stack((dual[1:], q[:, 1:], dual[:-1], q[:, :-1]), axis=-1)
+        # Where the grid wraps the first and the last edge are the same.
+        first = first[int(self.wrap[0]) :].reshape(-1, 4)
+        second = second[:, int(self.wrap[1]) :].reshape(-1, 4)
+        faces = np.concatenate((first, second))
+        around = np.stack((p[:-2], p[2:], q[:, :-2], q[:, 2:]))
+        return Stencils(
+            np.concatenate((centres.reshape(-1, 3), ghosts, self.dual.reshape(-1, 3))),
+            np.ascontiguousarray(faces[(faces >= 0).all(axis=1)]),
+            self.shape,
+            (around >= 0).all(axis=0).ravel(),
+        )
+
+
+Mesh = QuadMesh | QuadGrid | StaggeredGrid
+
+
+def grid_faces(index: Ints) -> Ints:
+    """Quads of a grid of vertex indices, counter-clockwise about first times second direction."""
+    quads = np.stack((index[:-1, :-1], index[1:, :-1], index[1:, 1:], index[:-1, 1:]), axis=-1)
+    return quads.reshape(-1, 4)
+
+
+def face_pairs(faces: Ints) -> tuple[NDArray[np.int64], ...]:
+    """Faces f, g on the two sides of every interior edge, and the slots i, j at which it begins there."""
+    sides = np.where(faces[:, 3] < 0, 3, 4)
+    face, slot = np.nonzero(np.arange(4) < sides[:, None])
+    start, end = faces[face, slot], faces[face, (slot + 1) % sides[face]]
+    low, high = np.minimum(start, end), np.maximum(start, end)
+    order = np.lexsort((high, low))
+    pair = np.flatnonzero((np.diff(low[order]) == 0) & (np.diff(high[order]) == 0))
+    one, other = order[pair], order[pair + 1]
+    return face[one], slot[one], face[other], slot[other]
+
+
+def _first_and_count(bad: Any) -> tuple[int, int]:
+    return int(np.argmax(bad)), int(np.count_nonzero(bad))
+
+
+def _checked_points(points: ArrayLike, name: str, shape: tuple[Any, ...]) -> Floats:
+    """Read-only C-contiguous float64; a number in `shape` is required, a letter is free."""
+    given = np.asarray(points)
+    if given.dtype.kind not in "fiu":
+        raise MeshError(f"{name}: expected real numbers, got dtype {given.dtype}")
+    if given.ndim != len(shape) or any(
+        isinstance(want, int) and have != want for have, want in zip(given.shape, shape, strict=True)
+    ):
+        raise MeshError(f"{name}: shape {given.shape}, expected ({', '.join(map(str, shape))})")
+    array = np.ascontiguousarray(given, dtype=np.float64).view()
+    array.flags.writeable = False
+    if not np.isfinite(array).all():
+        first, count = _first_and_count(~np.isfinite(array.reshape(-1, 3)).all(axis=1))
+        where = np.unravel_index(first, array.shape[:-1])
+        at = first if array.ndim == 2 else tuple(map(int, where))
+        raise MeshError(f"{name}: {count} non-finite point(s), first vertex {at}: {array[where]}")
+    return array
+
+
+def _checked_wrap(wrap: Sequence[bool]) -> tuple[bool, bool]:
+    if isinstance(wrap, str) or not np.iterable(wrap) or len(list(wrap)) != 2:
+        raise MeshError(f"wrap: expected two booleans, got {wrap!r}")
+    first, second = wrap
+    if not all(isinstance(w, bool | np.bool_) for w in (first, second)):
+        raise MeshError(f"wrap: expected two booleans, got {wrap!r}")
+    return bool(first), bool(second)
+
+
+def _checked_faces(faces: Any, points: Floats) -> tuple[Ints, NDArray[np.int64], int]:
+    """Faces as (m, 4) int32, the given face each stems from, and how many were split."""
+    try:
+        given = np.asarray(faces)
+    except ValueError:  # polygons of different lengths
+        given = np.empty(0, object)
+    if given.ndim == 2 and given.shape[1] in (3, 4) and given.dtype.kind in "iu":
+        table = np.full((len(given), 4), -1, np.int64)
+        table[:, : given.shape[1]] = given
+        source, n_split = np.arange(len(given)), 0
+    elif given.ndim == 2 and given.shape[1] in (3, 4):
+        raise MeshError(f"faces: expected integer indices, got dtype {given.dtype}")
+    else:
+        table, source, n_split = _from_polygons(faces, points)
+    if len(table) == 0:
+        raise MeshError("faces: none given")
+    n = len(points)
+    if n > np.iinfo(np.int32).max // 4:
+        raise MeshError(f"points: {n} are more than 32-bit indices can number")
+    padding = np.zeros(table.shape, bool)
+    padding[:, 3] = table[:, 3] == -1
+    bad = ((table < 0) & ~padding) | (table >= n)
+    if bad.any():
+        face, count = _first_and_count(bad.any(axis=1))
+        raise MeshError(
+            f"faces: {count} face(s) with an index outside 0..{n - 1}, "
+            f"first face {source[face]}: {table[face].tolist()}"
+        )
+    ordered = np.sort(table, axis=1)
+    repeated = (ordered[:, 1:] == ordered[:, :-1]).any(axis=1)
+    if repeated.any():
+        face, count = _first_and_count(repeated)
+        raise MeshError(
+            f"faces: {count} face(s) with a repeated vertex, first face {source[face]}: "
+            f"{table[face].tolist()}"
+        )
+    return table.astype(np.int32), source, n_split
+
+
+def _from_polygons(faces: Any, points: Floats) -> tuple[NDArray[np.int64], NDArray[np.int64], int]:
+    """Triangles and quads as they are, larger polygons by ear clipping across their vector area."""
+    import mapbox_earcut
+
+    rows: list[list[int]] = []
+    source: list[int] = []
+    n_split = 0
+    try:
+        polygons = [[operator.index(v) for v in face] for face in faces]
+    except TypeError:
+        raise MeshError(
+            "faces: expected an integer array of shape (m, 3) or (m, 4), or a sequence of polygons"
+        ) from None
+    for i, polygon in enumerate(polygons):
+        if len(polygon) < 3:
+            raise MeshError(f"faces: a face has at least 3 vertices, face {i} has {len(polygon)}")
+        pieces = [polygon]
+        if len(polygon) > 4:
+            if min(polygon) < 0 or max(polygon) >= len(points):
+                raise MeshError(f"faces: face {i} has an index outside 0..{len(points) - 1}: {polygon}")
+            if len(set(polygon)) < len(polygon):
+                raise MeshError(f"faces: face {i} has a repeated vertex: {polygon}")
+            corners = points[polygon] - points[polygon[0]]
+            normal = np.cross(corners, np.roll(corners, -1, axis=0)).sum(axis=0)
+            # The plane across the normal: the right singular vectors of a row begin with the row.
+            _, _, (along, *plane) = np.linalg.svd(normal[None])
+            if np.linalg.det([along, *plane]) * np.dot(along, normal) < 0:
+                plane.reverse()
+            flat = np.ascontiguousarray(corners @ np.transpose(plane))
+            ears = mapbox_earcut.triangulate_float64(flat, np.array([len(polygon)], np.uint32))
+            if len(ears) != 3 * (len(polygon) - 2):  # it crosses itself, or vertices are in line
+                ears = np.array([(0, v, v + 1) for v in range(1, len(polygon) - 1)])
+            pieces = [[polygon[v] for v in ear] for ear in ears.reshape(-1, 3)]
+            n_split += 1
+        for piece in pieces:
+            rows.append(piece + [-1] * (4 - len(piece)))
+            source.append(i)
+    table = np.array(rows, np.int64).reshape(-1, 4)
+    return table, np.array(source, np.int64), n_split
+
+
+def _consistent_sides(faces: Ints) -> tuple[Bools, bool]:
+    """Which faces to turn, as few as possible, so that neighbours agree; and whether all then do.
+
+    Non-orientable components are left as they are.
+    """
+    m = len(faces)
+    f, i, g, j = face_pairs(faces)
+    same_way = faces[f, i] == faces[g, j]
+    # Node f is face f as given, node f + m the same face turned; an edge joins what goes together.
+    rows = np.concatenate((f, f + m))
+    columns = np.concatenate((np.where(same_way, g + m, g), np.where(same_way, g, g + m)))
+    graph = sparse.coo_array((np.ones(rows.size, bool), (rows, columns)), shape=(2 * m, 2 * m))
+    label = sparse.csgraph.connected_components(graph, directed=False)[1]
+    orientable = not bool((label[:m] == label[m:]).any())
+    kept = np.bincount(label[:m], minlength=label.max() + 1)
+    turned = np.bincount(label[m:], minlength=label.max() + 1)
+    # A component and its mirror image differ in which faces they turn: keep the one that turns fewer.
+    ours, theirs = kept[label[:m]], turned[label[:m]]
+    first = np.full(label.max() + 1, m)
+    np.minimum.at(first, label[:m], np.arange(m))
+    mirror = np.empty(label.max() + 1, np.int64)
+    mirror[label[:m]] = label[m:]
+    tie = first[label[:m]] > first[mirror[label[:m]]]
+    return (ours < theirs) | ((ours == theirs) & tie), orientable

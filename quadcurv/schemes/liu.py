@@ -1,0 +1,32 @@
+"""Liu, Xu and Zhang's formula on quads; on triangles the cotan formula."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy import sparse
+
+from quadcurv.mesh import Floats, Stencils
+from quadcurv.schemes.base import Scheme
+from quadcurv.schemes.cotan import cotan_matrices
+from quadcurv.schemes.diamond import quad_stiffness
+
+
+def _apply(stencils: Stencils) -> tuple[Floats, Floats]:
+    from quadcurv.kernels import diamond
+
+    flux, area = np.zeros_like(stencils.points), np.zeros(len(stencils.points))
+    diamond.quads(stencils.points, stencils.faces, flux, area)
+    if stencils.has_triangles:
+        diamond.triangles(stencils.points, stencils.faces, flux, area)
+    return flux[: stencils.n], area[: stencils.n]
+
+
+def _assemble(stencils: Stencils) -> tuple[sparse.csr_array, Floats]:
+    stiffness = quad_stiffness(stencils)
+    if stencils.has_triangles:
+        triangles = stencils.faces[stencils.faces[:, 3] < 0, :3]
+        stiffness = stiffness + cotan_matrices(stencils.points, triangles, "barycentric")[0]
+    return stiffness[: stencils.n], _apply(stencils)[1]
+
+
+LIU = Scheme("liu", 2, "Liu, Xu and Zhang 2008, eq. 2.4 and 2.10 (thesis, eq. 4.4-4.7)", _assemble, _apply)
