@@ -54,9 +54,7 @@ def successive_rates(sizes: ArrayLike, errors: ArrayLike) -> NDArray[np.float64]
     return -np.diff(y) / np.diff(x)
 
 
-def _logarithms(
-    sizes: ArrayLike, errors: ArrayLike
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def _logarithms(sizes: ArrayLike, errors: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     x, y = np.array(sizes, dtype=float), np.array(errors, dtype=float)
     if x.ndim != 1 or x.shape != y.shape or len(x) < 2:
         raise ValueError(

@@ -75,7 +75,7 @@ def save_maps(comparison: Comparison, path: str | Path, field: str = "error") ->
     if path.suffix == ".png":
         plotter.screenshot(path)
     else:
-        plotter.export_html(path)
+        plotter.trame.export_html(path)
     plotter.close()
 
 

@@ -1,0 +1,199 @@
+"""What the comparison scripts share: figures, tables, claims and the command line."""
+
+import argparse
+import csv
+from collections.abc import Mapping, Sequence
+from dataclasses import astuple, dataclass, fields
+from pathlib import Path
+from typing import Any, Literal
+
+import matplotlib as mpl
+import numpy as np
+from cycler import cycler
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from numpy.typing import ArrayLike
+from rich.console import Console
+from rich.table import Table
+
+from quadcurv.rates import fitted_rate
+
+# Okabe and Ito (2008): told apart with every kind of colour blindness.
+COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
+MARKERS = ("o", "s", "^", "D", "v", "P", "X")
+OUTPUT = Path(__file__).parent / "output"
+
+paper_style = mpl.rc_context(
+    {
+        "axes.axisbelow": True,
+        "axes.grid": True,
+        "axes.prop_cycle": cycler(color=COLOURS),
+        "axes.spines.right": False,
+        "axes.spines.top": False,
+        "axes.titlesize": 10,
+        "figure.constrained_layout.use": True,
+        "font.size": 9.5,
+        "grid.alpha": 0.3,
+        "grid.linewidth": 0.5,
+        "legend.fontsize": 8.5,
+        "legend.framealpha": 0.9,
+        "lines.linewidth": 1.3,
+        "lines.markersize": 4.5,
+        "savefig.dpi": 200,
+        "svg.hashsalt": "quadcurv",
+    }
+)
+"""Decorator of functions that make and save figures: type and colours for print."""
+
+Verdict = Literal["reproduced", "reproduced only if ...", "not reproduced", "slip"]
+
+
+@dataclass(frozen=True)
+class Claim:
+    """A claim of the thesis beside what was measured.
+
+    Attributes
+    ----------
+    where : str
+        Section, equation or figure.
+    claim, measured : str
+        What is printed there, and what comes out.
+    verdict : str
+        "reproduced", "reproduced only if ...", "not reproduced" or "slip".
+    """
+
+    where: str
+    claim: str
+    measured: str
+    verdict: Verdict
+
+
+def print_claims(claims: Sequence[Claim], title: str, console: Console | None = None) -> None:
+    """Print claims as a table."""
+    styles = {"reproduced": "green", "not reproduced": "red"}
+    table = Table(*(f.name for f in fields(Claim)), title=title, show_lines=True)
+    for c in claims:
+        table.add_row(*astuple(c), style=styles.get(c.verdict, "yellow"))
+    (console or Console()).print(table)
+
+
+def claims_markdown(claims: Sequence[Claim]) -> str:
+    """Claims as a Markdown table."""
+    names = [f.name for f in fields(Claim)]
+    cells = [[cell.replace("|", "\\|") for cell in astuple(c)] for c in claims]
+    rows = [names, ["---"] * len(names), *cells]
+    return "".join(f"| {' | '.join(row)} |\n" for row in rows)
+
+
+def figure(
+    rows: int = 1, columns: int = 1, size: tuple[float, float] = (5.2, 3.6), **keywords: Any
+) -> tuple[Figure, Any]:
+    """Figure of the given size in inches and its axes, or an array of them, without pyplot.
+
+    Parameters
+    ----------
+    rows, columns, size
+        Of the whole figure.
+    **keywords
+        As for `matplotlib.figure.Figure.subplots`.
+    """
+    fig = Figure(figsize=size)
+    return fig, fig.subplots(rows, columns, **keywords)
+
+
+def save_figure(fig: Figure, output: Path, stem: str, columns: Mapping[str, ArrayLike] | None = None) -> None:
+    """Write output/stem.png (200 dpi) and .svg, and the data they show, in columns, to stem.csv."""
+    output.mkdir(parents=True, exist_ok=True)
+    fig.savefig(output / f"{stem}.png", metadata={"Software": None})
+    fig.set_layout_engine("none")  # laid out by now
+    fig.savefig(output / f"{stem}.svg", metadata={"Date": None})
+    if columns is not None:
+        write_csv(output, stem, columns)
+
+
+def write_csv(output: Path, stem: str, columns: Mapping[str, ArrayLike]) -> None:
+    """Write columns of one length to output/stem.csv, in full precision."""
+    output.mkdir(parents=True, exist_ok=True)
+    values = [np.asarray(column).tolist() for column in columns.values()]
+    with open(output / f"{stem}.csv", "w", newline="") as file:
+        writer = csv.writer(file)
+        writer.writerow(columns)
+        writer.writerows(zip(*values, strict=True))
+
+
+def convergence_plot(
+    axes: Axes,
+    sizes: ArrayLike,
+    series: Mapping[str, ArrayLike],
+    fit: Mapping[str, tuple[float, float]],
+    slopes: Sequence[float] = (),
+    rounding: tuple[ArrayLike, str] | None = None,
+) -> dict[str, float]:
+    """Errors against size on logarithmic axes with best-fit lines, as the thesis draws them.
+
+    Parameters
+    ----------
+    axes : matplotlib axes
+        Drawn into; the caller labels them.
+    sizes : array_like, shape (m,)
+        Number of points or cells in one direction.
+    series : mapping from label to array_like, shape (m,)
+        Errors. Zeros lie on the lower edge of the plot with an open marker; NaN is left out.
+    fit : mapping from label to (first, last) size
+        The sizes to fit, between two vertical dashed lines; a label not in it has no line.
+    slopes : sequence of float
+        Orders to show by grey reference lines above the last errors.
+    rounding : (array_like of shape (m,), label), optional
+        What rounding alone is expected to give, shown dotted.
+
+    Returns
+    -------
+    dict
+        Fitted rate by label, for the labels in `fit`; NaN, and no line, where an error is zero.
+    """
+    n = np.asarray(sizes, dtype=float)
+    errors = {label: np.asarray(e, dtype=float) for label, e in series.items()}
+    positive = np.concatenate([e[np.isfinite(e) & (e > 0)] for e in errors.values()])
+    floor = positive.min() / 10 if positive.size else np.finfo(float).eps
+    axes.set_xscale("log", base=2)
+    axes.set_yscale("log")
+    axes.minorticks_off()
+    rates = {}
+    for i, (label, e) in enumerate(errors.items()):
+        style: dict[str, Any] = {"color": COLOURS[i % len(COLOURS)], "marker": MARKERS[i % len(MARKERS)]}
+        text = label
+        if label in fit:
+            first, last = fit[label]
+            inside = (n >= first) & (n <= last)
+            rates[label] = rate = fitted_rate(n[inside], e[inside])
+            if np.isfinite(rate):
+                text = f"{label}: rate {rate:.2f}"
+                factor = np.exp(np.log(e[inside] * n[inside] ** rate).mean())
+                axes.plot(n[inside], factor * n[inside] ** -rate, color=style["color"])
+        zero = e == 0
+        axes.plot(n, np.where(zero, np.nan, e), linestyle="none", label=text, **style)
+        if zero.any():
+            axes.plot(n[zero], np.full(zero.sum(), floor), linestyle="none", fillstyle="none", **style)
+            axes.set_ylim(bottom=floor)
+    for edge in sorted({size for window in fit.values() for size in window}):
+        axes.axvline(edge, color="0.4", linestyle="--", linewidth=0.9)
+    top = max((e[-1] for e in errors.values() if e[-1] > 0), default=floor)
+    for slope in slopes:
+        tail = n[len(n) // 2 :]
+        guide = 4 * top * (tail / n[-1]) ** -slope
+        axes.plot(tail, guide, color="0.6", linewidth=0.9)
+        middle = len(tail) // 2
+        axes.text(tail[middle], guide[middle], f" order {slope:g}", color="0.4", va="bottom")
+    if rounding is not None:
+        level, label = rounding
+        axes.plot(n, level, color="0.3", linestyle=":", label=f"rounding, {label}")
+    axes.legend()
+    return rates
+
+
+def arguments(description: str | None) -> argparse.Namespace:
+    """Command line of a comparison script: output (folder) and quick (bool)."""
+    parser = argparse.ArgumentParser(description=description)
+    parser.add_argument("--output", type=Path, default=OUTPUT, help="folder for figures and tables")
+    parser.add_argument("--quick", action="store_true", help="smaller sizes, a few seconds")
+    return parser.parse_args()
