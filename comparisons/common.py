@@ -2,6 +2,7 @@
 
 import argparse
 import csv
+import os
 from collections.abc import Mapping, Sequence
 from dataclasses import astuple, dataclass, fields
 from pathlib import Path
@@ -11,15 +12,20 @@ import matplotlib as mpl
 import numpy as np
 from cycler import cycler
 from matplotlib.axes import Axes
+from matplotlib.cm import ScalarMappable
+from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
 from numpy.typing import ArrayLike
 from rich.console import Console
 from rich.table import Table
 
+from quadcurv.mesh import Mesh, QuadGrid, StaggeredGrid
 from quadcurv.rates import fitted_rate
+from quadcurv.view import opengl_problem
 
 # Okabe and Ito (2008): told apart with every kind of colour blindness.
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
+MAP = "viridis"
 MARKERS = ("o", "s", "^", "D", "v", "P", "X")
 OUTPUT = Path(__file__).parent / "output"
 
@@ -189,6 +195,113 @@ def convergence_plot(
         axes.plot(n, level, color="0.3", linestyle=":", label=f"rounding, {label}")
     axes.legend()
     return rates
+
+
+def below(value: float, power: int) -> str:
+    """Rounding as its bound, "below 1e-power", which no machine changes; a value above it as it is."""
+    return f"below 1e-{power}" if value < 10.0**-power else f"{value:.1e}"
+
+
+def save_maps(
+    output: Path,
+    stem: str,
+    panels: Mapping[str, tuple[Mesh, ArrayLike]],
+    label: str = "",
+    decades: tuple[int, int] | None = None,
+    camera: tuple[float, float, float] = (1.0, 1.0, 0.7),
+    size: tuple[float, float] = (6.8, 3.2),
+) -> str | None:
+    """Paint values on surfaces side by side, on one scale: output/stem.png, .svg and .csv.
+
+    Where nothing can render, pages output/stem_1.html, ... take the place of the pictures.
+
+    Parameters
+    ----------
+    output, stem
+        As for `save_figure`.
+    panels : mapping from title to (mesh, values)
+        Values at the vertices of the mesh, or in the cells of a staggered grid. NaN is grey.
+    label : str
+        Of the colour bar.
+    decades : (low, high), optional
+        Powers of ten at the ends of the logarithmic scale. Without them values only show the shape: lit,
+        on a linear scale, without a bar.
+    camera : (x, y, z)
+        Direction from the surface to the viewer.
+    size : (width, height)
+        Of the figure in inches.
+
+    Returns
+    -------
+    str or None
+        Why nothing can render, if so.
+    """
+    output.mkdir(parents=True, exist_ok=True)
+    problem = opengl_problem()
+    if problem:  # VTK then describes the scene without opening a context
+        os.environ["VTK_DEFAULT_OPENGL_WINDOW"] = "vtkOSOpenGLRenderWindow"
+    images, table = {}, []
+    for i, (title, (mesh, given)) in enumerate(panels.items(), 1):
+        values = np.asarray(given, dtype=float)
+        plotter = _scene(mesh, values, decades, camera)
+        if problem:
+            plotter.export_html(output / f"{stem}_{i}.html")
+        else:
+            picture = np.asarray(plotter.screenshot(transparent_background=True, return_img=True))
+            rows, columns = (np.flatnonzero(picture[..., 3].any(axis=axis)) for axis in (1, 0))
+            images[title] = picture[rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1]
+        plotter.close()
+        stencils = mesh.stencils()
+        table += [(title, *x, v) for x, v in zip(stencils.points[: stencils.n], values.ravel(), strict=True)]
+    write_csv(output, stem, dict(zip(("panel", "x", "y", "z", "value"), zip(*table, strict=True), strict=True)))
+    if problem:
+        return problem
+    widths = [image.shape[1] / image.shape[0] for image in images.values()]
+    fig, axes = figure(1, len(images), size, width_ratios=widths, squeeze=False)
+    for ax, (title, image) in zip(axes.flat, images.items(), strict=True):
+        ax.imshow(image, interpolation="antialiased")
+        ax.set_title(title)
+        ax.axis("off")
+    if decades is not None:
+        low, high = (10.0**power for power in decades)
+        known = np.array([row[-1] for row in table])
+        ends = {(True, True): "both", (True, False): "min", (False, True): "max"}
+        extend = ends.get((bool((known < low).any()), bool((known > high).any())), "neither")
+        scale = ScalarMappable(LogNorm(low, high), MAP)
+        fig.colorbar(scale, ax=axes, label=label, extend=extend, shrink=0.8, aspect=25, pad=0.03)
+    save_figure(fig, output, stem)
+    return None
+
+
+def _scene(mesh: Mesh, values: Any, decades: tuple[int, int] | None, camera: tuple[float, ...]) -> Any:
+    """Plotter with one surface, edges drawn where they can be told apart."""
+    import pyvista as pv
+
+    corners = QuadGrid(mesh.dual) if isinstance(mesh, StaggeredGrid) else mesh
+    stencils = corners.stencils()
+    surface = pv.PolyData.from_regular_faces(np.array(stencils.points), stencils.faces)
+    data = surface.cell_data if isinstance(mesh, StaggeredGrid) else surface.point_data
+    data["value"] = values.ravel()
+    mapper: dict[str, Any] = {"smooth_shading": True, "specular": 0.2, "ambient": 0.25}
+    if decades is not None:
+        data["value"] = np.log10(np.maximum(values.ravel(), 10.0 ** decades[0]))
+        mapper = {"lighting": False, "clim": decades}
+    plotter = pv.Plotter(off_screen=True, window_size=(1200, 1200))
+    plotter.enable_parallel_projection()
+    plotter.enable_anti_aliasing("ssaa")
+    plotter.add_mesh(
+        surface,
+        scalars="value",
+        cmap=MAP,
+        show_edges=surface.n_cells <= 20_000,
+        edge_opacity=0.25,
+        nan_color="#d0d0d0",
+        show_scalar_bar=False,
+        **mapper,
+    )
+    plotter.view_vector(camera, viewup=(0, 0, 1))
+    plotter.camera.zoom(1.3)
+    return plotter
 
 
 def arguments(description: str | None) -> argparse.Namespace:
