@@ -26,9 +26,6 @@ from quadcurv.schemes.cotan import cotan_matrices
 
 Results = dict[str, float]
 
-# Valence 6 keeps two of the four primal neighbours: those along the first direction, or the others.
-FIRST, OTHER = cotan(6), cotan(6, diagonal=1)
-ALL = (*list(SCHEMES.values())[:4], OTHER, *list(SCHEMES.values())[4:])
 LABELS = {
     "finite_volume": "finite volume",
     "liu": "Liu",
@@ -40,6 +37,9 @@ LABELS = {
     "cotan-6-voronoi": "cotan 6, Voronoi",
     "cotan-8-voronoi": "cotan 8, Voronoi",
 }
+# Valence 6 keeps two of the four primal neighbours: those along the first direction, or the others.
+OTHER = cotan(6, diagonal=1)
+ALL = tuple(OTHER if name == OTHER.name else SCHEMES[name] for name in LABELS)
 CELLS = "cells $n$ around the cylinder"
 ERROR = r"error of $H$ (1/length)"
 
@@ -162,11 +162,6 @@ def factor_of_4_1(n: int = 32) -> float:
     return float(np.linalg.norm(printed[inside], axis=1).mean() * 2 * 1.0)
 
 
-def own_stencil(quick: bool) -> Convergence:
-    """The finite-volume scheme on a prescribed mesh: the vertex grid of a cylinder along its axis."""
-    return convergence(surfaces.cylinder(), ALL, refinements(quick)[1:], "grid")
-
-
 @paper_style
 def main(output: Path, quick: bool = False, console: Console | None = None) -> Results:
     """Make all figures and tables of chapter 4.
@@ -188,34 +183,30 @@ def main(output: Path, quick: bool = False, console: Console | None = None) -> R
     console = console or Console()
     output.mkdir(parents=True, exist_ok=True)
     sizes = refinements(quick)
-    stencil_diagram(output)
-    flat = convergence(surfaces.cylinder(), ALL, sizes)
-    wavy = convergence(surfaces.cylinder(f=wave), ALL, sizes)
-    pillow = convergence(surfaces.pillow_sphere(), ALL, [(2 * n, n) for n in sizes])
-    globe = convergence(surfaces.sphere(), ALL, sizes)
-    vertex = own_stencil(quick)
-    cylinder_figure(output, {"0": flat, r"\sin 2\theta": wavy})
-    pillow_figure(output, pillow, "one", "figure_4_3")
-    pillow_figure(output, pillow, "inf", "figure_4_4")
-    error_maps(output, console, quick)
-    runs = {
-        "cylinder": flat,
-        "wavy cylinder": wavy,
-        "pillow": pillow,
-        "sphere": globe,
-        "cylinder vertices": vertex,
+    cases: dict[str, tuple[surfaces.Surface, list, str]] = {
+        "cylinder": (surfaces.cylinder(), sizes, "staggered"),
+        "wavy cylinder": (surfaces.cylinder(f=wave), sizes, "staggered"),
+        "pillow": (surfaces.pillow_sphere(), [(2 * n, n) for n in sizes], "staggered"),
+        "sphere": (surfaces.sphere(), sizes, "staggered"),
+        "cylinder vertices": (surfaces.cylinder(), sizes[1:], "grid"),
     }
+    runs: dict[str, Convergence] = {}
     results: Results = {}
-    for case, run in runs.items():
+    for case, (surface, shapes, layout) in cases.items():
+        runs[case] = run = convergence(surface, ALL, shapes, layout)
         console.print(run)
         run.to_csv(output / f"chapter4_{case.replace(' ', '_')}.csv")
         for scheme in run.schemes:
             for norm in ("one", "inf"):
                 results[f"{case}: {scheme}, {norm}"] = float(run.errors[scheme][norm][-1])
                 results[f"{case}: {scheme}, {norm}-rate"] = run.fitted_rate(scheme, norm, len(sizes) - 1)
-    results["cylinder: one over inf of cotan-6"] = float(
-        (flat.errors["cotan-6"]["one"] / flat.errors["cotan-6"]["inf"]).min()
-    )
+    stencil_diagram(output)
+    cylinder_figure(output, {"0": runs["cylinder"], r"\sin 2\theta": runs["wavy cylinder"]})
+    pillow_figure(output, runs["pillow"], "one", "figure_4_3")
+    pillow_figure(output, runs["pillow"], "inf", "figure_4_4")
+    error_maps(output, console, quick)
+    one, inf = (runs["cylinder"].errors["cotan-6"][norm] for norm in ("one", "inf"))
+    results["cylinder: one over inf of cotan-6"] = float((one / inf).min())
     results["flux difference"] = fluxes_differ()
     results["factor of 4.1"] = factor_of_4_1()
     return results
