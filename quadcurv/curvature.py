@@ -2,19 +2,22 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
-from scipy import sparse
+import scipy
 
+from quadcurv.boundary import BOUNDARIES, frame, ghosted_faces
 from quadcurv.boundary import stencils as with_boundary
 from quadcurv.interop import as_mesh
-from quadcurv.mesh import Floats, Stencils
-from quadcurv.schemes import Scheme, as_scheme
+from quadcurv.mesh import Floats, QuadGrid, QuadMesh, StaggeredGrid, Stencils
+from quadcurv.schemes import Curvatures, Fit, Scheme, as_scheme
+from quadcurv.schemes.angle_defect import angle_defect
 
 
 def mean_curvature(
-    mesh: Any, scheme: str | Scheme = "finite_volume", boundary: str = "extrapolate"
+    mesh: Any, scheme: str | Scheme | Fit = "finite_volume", boundary: str = "extrapolate"
 ) -> Floats:
     """Mean curvature H = (k1 + k2) / 2 at every vertex.
 
@@ -22,8 +25,8 @@ def mean_curvature(
     ----------
     mesh : QuadMesh, QuadGrid, StaggeredGrid, trimesh.Trimesh, pyvista.PolyData, path or (points, faces)
         See :func:`quadcurv.as_mesh`.
-    scheme : str or Scheme
-        A name in ``quadcurv.SCHEMES``.
+    scheme : str, Scheme or Fit
+        A name in ``quadcurv.SCHEMES``, or one of ``quadcurv.schemes``.
     boundary : {"extrapolate", "nan"}
         See :func:`quadcurv.stencils`.
 
@@ -31,7 +34,8 @@ def mean_curvature(
     -------
     (n,) or (r, c) float64
         In 1 / length, positive where the surface bends away from its normal (+1 / R on a sphere of
-        radius R with outward normals); H = -(H n) . n with n from :func:`vertex_normals`. Without sign
+        radius R with outward normals); H = -(H n) . n with n from :func:`vertex_normals`, or a fit's
+        own normal. Without sign
         on a non-orientable mesh. NaN where the ring is not one closed fan (isolated vertices, boundaries
         that are not extrapolated, several fans) or degenerate (a face without area).
 
@@ -42,13 +46,14 @@ def mean_curvature(
     ValueError
         Unknown scheme or boundary.
     """
-    stencils = with_boundary(as_mesh(mesh), boundary)
-    H = -np.einsum("ix,ix->i", _curvature_normal(stencils, as_scheme(scheme)), _normals(stencils))
-    return (H if stencils.orientable else np.abs(H)).reshape(stencils.shape)
+    mesh, scheme = as_mesh(mesh), as_scheme(scheme)
+    if isinstance(scheme, Fit):
+        return scheme.curvatures(mesh, boundary).mean
+    return evaluate(mesh, "mean_curvature", scheme=scheme, boundary=boundary)["mean_curvature"]
 
 
 def mean_curvature_normal(
-    mesh: Any, scheme: str | Scheme = "finite_volume", boundary: str = "extrapolate"
+    mesh: Any, scheme: str | Scheme | Fit = "finite_volume", boundary: str = "extrapolate"
 ) -> Floats:
     """Mean curvature normal H n, once the mean curvature (half the Laplace-Beltrami of the positions).
 
@@ -68,8 +73,68 @@ def mean_curvature_normal(
     ValueError
         As for :func:`mean_curvature`.
     """
-    stencils = with_boundary(as_mesh(mesh), boundary)
-    return _curvature_normal(stencils, as_scheme(scheme)).reshape(*stencils.shape, 3)
+    mesh, scheme = as_mesh(mesh), as_scheme(scheme)
+    if isinstance(scheme, Fit):
+        fits = scheme.curvatures(mesh, boundary)
+        return -fits.mean[..., None] * fits.normal
+    return evaluate(mesh, "mean_curvature_normal", scheme=scheme, boundary=boundary)["mean_curvature_normal"]
+
+
+def gaussian_curvature(mesh: Any, scheme: str | Fit = "jet", boundary: str = "extrapolate") -> Floats:
+    """Gaussian curvature K = k1 k2 at every vertex.
+
+    Parameters
+    ----------
+    mesh, boundary
+        As for :func:`mean_curvature`.
+    scheme : str or Fit
+        A fit, or "angle_defect": 2 pi less the angles around a vertex, over a third of the triangles
+        around it, quads being cut as for "cotan-6". On a closed mesh these sum to 2 pi times the Euler
+        characteristic, at any resolution; vertex by vertex they converge on regular meshes only.
+
+    Returns
+    -------
+    (n,) or (r, c) float64
+        In 1 / length^2. NaN as for :func:`mean_curvature`.
+
+    Raises
+    ------
+    ValueError
+        As for :func:`mean_curvature`; a scheme that has no Gaussian curvature.
+    """
+    mesh = as_mesh(mesh)
+    if scheme != "angle_defect":
+        return _as_fit(scheme).curvatures(mesh, boundary).gaussian
+    stencils = with_boundary(mesh, boundary)
+    defect, area = angle_defect(stencils)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        K = defect / area
+    K[~stencils.closed | ~np.isfinite(K)] = np.nan
+    return K.reshape(stencils.shape)
+
+
+def principal_curvatures(mesh: Any, scheme: str | Fit = "jet", boundary: str = "extrapolate") -> Curvatures:
+    """Principal curvatures k1 >= k2, their directions, and all else a fit knows.
+
+    Parameters
+    ----------
+    mesh, boundary
+        As for :func:`mean_curvature`.
+    scheme : str or Fit
+
+    Returns
+    -------
+    Curvatures
+        ``k1``, ``k2`` (n,) or (r, c) in 1 / length, signed as the mean curvature; ``direction1``,
+        ``direction2`` and ``normal`` (n, 3) or (r, c, 3); standard errors. On a non-orientable mesh the
+        side with H >= 0 is taken. NaN as for :func:`mean_curvature`.
+
+    Raises
+    ------
+    ValueError
+        As for :func:`mean_curvature`; a scheme that is no fit.
+    """
+    return _as_fit(scheme).curvatures(as_mesh(mesh), boundary)
 
 
 def vertex_normals(mesh: Any, boundary: str = "extrapolate") -> Floats:
@@ -91,11 +156,10 @@ def vertex_normals(mesh: Any, boundary: str = "extrapolate") -> Floats:
     ValueError
         As for :func:`mean_curvature`.
     """
-    stencils = with_boundary(as_mesh(mesh), boundary)
-    return _normals(stencils).reshape(*stencils.shape, 3)
+    return evaluate(mesh, "vertex_normals", boundary=boundary)["vertex_normals"]
 
 
-def dual_areas(mesh: Any, scheme: str | Scheme = "finite_volume") -> Floats:
+def dual_areas(mesh: Any, scheme: str | Scheme | Fit = "finite_volume") -> Floats:
     """Area that a scheme gives to each vertex: the diagonal of its mass matrix.
 
     Parameters
@@ -113,19 +177,23 @@ def dual_areas(mesh: Any, scheme: str | Scheme = "finite_volume") -> Floats:
     Raises
     ------
     ValueError
-        As for :func:`mean_curvature`.
+        As for :func:`mean_curvature`; the scheme is a fit.
     """
-    stencils = as_mesh(mesh).stencils()
-    return as_scheme(scheme).apply(stencils)[1].reshape(stencils.shape)
+    return evaluate(mesh, "dual_areas", scheme=scheme, boundary="nan")["dual_areas"]
 
 
-def stiffness_matrix(mesh: Any, scheme: str | Scheme = "finite_volume") -> sparse.csr_array:
+def stiffness_matrix(
+    mesh: Any, scheme: str | Scheme | Fit = "finite_volume", out: scipy.sparse.csr_array | None = None
+) -> scipy.sparse.csr_array:
     """Stiffness matrix S; the Laplace-Beltrami operator is -M^-1 S, and H n = -M^-1 S x / 2.
 
     Parameters
     ----------
     mesh, scheme
         As for :func:`mean_curvature`.
+    out : csr_array, optional
+        The matrix of the same connectivity and scheme at other positions, to be overwritten and returned.
+        For the finite-volume scheme and Liu's formula.
 
     Returns
     -------
@@ -139,12 +207,17 @@ def stiffness_matrix(mesh: Any, scheme: str | Scheme = "finite_volume") -> spars
     Raises
     ------
     ValueError
-        As for :func:`mean_curvature`.
+        As for :func:`mean_curvature`; the scheme is a fit.
     """
-    return as_scheme(scheme).assemble(as_mesh(mesh).stencils())[0]
+    scheme, stencils = _as_laplacian(scheme), as_mesh(mesh).stencils()
+    if scheme.stiffness is not None:
+        return scheme.stiffness(stencils, out)
+    if out is not None:
+        raise ValueError(f"out: {scheme.name} assembles a new matrix each time")
+    return scheme.assemble(stencils)[0]
 
 
-def mass_matrix(mesh: Any, scheme: str | Scheme = "finite_volume") -> sparse.dia_array:
+def mass_matrix(mesh: Any, scheme: str | Scheme | Fit = "finite_volume") -> scipy.sparse.dia_array:
     """Diagonal mass matrix M of a scheme: its :func:`dual_areas`.
 
     Parameters
@@ -159,9 +232,136 @@ def mass_matrix(mesh: Any, scheme: str | Scheme = "finite_volume") -> sparse.dia
     Raises
     ------
     ValueError
-        As for :func:`mean_curvature`.
+        As for :func:`mean_curvature`; the scheme is a fit.
     """
-    return sparse.diags_array(dual_areas(mesh, scheme).ravel())
+    return scipy.sparse.diags_array(dual_areas(mesh, scheme).ravel())
+
+
+def evaluate(
+    mesh: Any,
+    *wanted: str,
+    scheme: str | Scheme = "finite_volume",
+    boundary: str = "extrapolate",
+    out: Mapping[str, Floats] | None = None,
+) -> dict[str, Floats]:
+    """Several of the verbs in one pass, into arrays of the caller's if there are any.
+
+    Parameters
+    ----------
+    mesh, scheme, boundary
+        As for :func:`mean_curvature`; a fit gives none of these.
+    *wanted : {"mean_curvature", "mean_curvature_normal", "vertex_normals", "dual_areas"}
+        Names of verbs.
+    out : mapping from name to float64 array, optional
+        C-contiguous arrays of the shape of the result, to be written to. Others are allocated.
+
+    Returns
+    -------
+    dict
+        Results by name: what the verbs return, the arrays of `out` among them.
+
+    Raises
+    ------
+    ValueError
+        As for the verbs; an unknown name; an array in `out` of another shape, type or layout.
+    """
+    mesh, scheme = as_mesh(mesh), _as_laplacian(scheme)
+    if boundary not in BOUNDARIES:
+        raise ValueError(f"boundary: expected one of {BOUNDARIES}, got {boundary!r}")
+    shape = (len(mesh.points),) if isinstance(mesh, QuadMesh) else mesh.shape
+    results = {}
+    for name in dict.fromkeys((*wanted, *(out or ()))):
+        if name not in _PER_VERTEX:
+            raise ValueError(f"wanted: expected some of {', '.join(_PER_VERTEX)}, got {name!r}")
+        full = shape + _PER_VERTEX[name]
+        results[name] = array = np.empty(full) if out is None or name not in out else out[name]
+        flags = array.flags
+        if array.shape != full or array.dtype != np.float64 or not (flags.c_contiguous and flags.writeable):
+            raise ValueError(f"out: {name} wants a writeable C-contiguous float64 array of shape {full}")
+    if scheme.write is None:
+        _evaluate_stencils(mesh.stencils(), with_boundary(mesh, boundary), scheme, results)
+    elif isinstance(mesh, QuadMesh):
+        _evaluate_faces(mesh, scheme, boundary, results)
+    else:
+        _evaluate_grid(mesh, scheme, boundary, results)
+    return results
+
+
+_PER_VERTEX: dict[str, tuple[int, ...]] = {
+    "mean_curvature": (),
+    "mean_curvature_normal": (3,),
+    "vertex_normals": (3,),
+    "dual_areas": (),
+}
+
+
+def _evaluate_stencils(
+    given: Stencils, treated: Stencils, scheme: Scheme, results: dict[str, Floats]
+) -> None:
+    """From flux and area; the dual areas are those of the mesh as given."""
+    if "dual_areas" in results:
+        results["dual_areas"][...] = scheme.apply(given)[1].reshape(given.shape)
+    if "vertex_normals" in results:
+        results["vertex_normals"][...] = _normals(treated).reshape(*treated.shape, 3)
+    if results.keys() <= {"dual_areas", "vertex_normals"}:
+        return
+    Hn = _curvature_normal(treated, scheme)
+    if "mean_curvature_normal" in results:
+        results["mean_curvature_normal"][...] = Hn.reshape(*treated.shape, 3)
+    if "mean_curvature" in results:
+        H = -np.einsum("ix,ix->i", Hn, _normals(treated))
+        results["mean_curvature"][...] = (H if treated.orientable else np.abs(H)).reshape(treated.shape)
+
+
+def _evaluate_faces(mesh: QuadMesh, scheme: Scheme, boundary: str, results: dict[str, Floats]) -> None:
+    """Regular vertices in one pass, the others from the stencils of the part of the mesh around them."""
+    assert scheme.write is not None
+    scheme.write(mesh, None, results)
+    others, part = mesh.others()
+    if others.size:
+        inner = {name: np.empty(part.shape + _PER_VERTEX[name]) for name in results}
+        treated = part if boundary == "nan" else ghosted_faces(part)
+        _evaluate_stencils(part, treated, scheme, inner)
+        for name, values in inner.items():
+            results[name][others] = values[: others.size]
+    if not mesh.orientable and "mean_curvature" in results:
+        np.abs(results["mean_curvature"], out=results["mean_curvature"])
+
+
+def _evaluate_grid(
+    grid: QuadGrid | StaggeredGrid, scheme: Scheme, boundary: str, results: dict[str, Floats]
+) -> None:
+    """All in one pass, save what is cut off at open sides: from the stencils of two rows along them."""
+    assert scheme.write is not None
+    scheme.write(grid, frame(grid, boundary), results)
+    cut = {"dual_areas"} if boundary == "extrapolate" else {"dual_areas", "vertex_normals"}
+    if not cut & results.keys() or (isinstance(grid, StaggeredGrid) and grid.has_ghosts):
+        return
+    for axis in (0, 1):
+        if grid.wrap[axis]:
+            continue
+        for end in (0, -1):
+            side = grid.side(axis, end)
+            inner = {name: np.empty(side.shape + _PER_VERTEX[name]) for name in cut & results.keys()}
+            _evaluate_stencils(side.stencils(), side.stencils(), scheme, inner)
+            for name, values in inner.items():
+                np.moveaxis(results[name], axis, 0)[end] = np.moveaxis(values, axis, 0)[end]
+
+
+def _as_laplacian(scheme: str | Scheme | Fit) -> Scheme:
+    scheme = as_scheme(scheme)
+    if isinstance(scheme, Fit):
+        raise ValueError(f"scheme: {scheme.name} is a fit, which has no stiffness matrix and no dual areas")
+    return scheme
+
+
+def _as_fit(scheme: str | Scheme | Fit) -> Fit:
+    scheme = as_scheme(scheme)
+    if isinstance(scheme, Scheme):
+        raise ValueError(
+            f"scheme: {scheme.name} gives the mean curvature alone; a fit is needed, such as 'jet'"
+        )
+    return scheme
 
 
 def _curvature_normal(stencils: Stencils, scheme: Scheme) -> Floats:

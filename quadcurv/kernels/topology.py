@@ -3,13 +3,40 @@
 Faces are an (m, 4) int32 array, a triangle's last entry being -1. Corner 4 f + s is slot s of face f.
 """
 
+from functools import partial
+
 import numpy as np
-from numba import njit
+
+from quadcurv.kernels import parallel
+from quadcurv.kernels.compiled import helper, kernel
 
 ISOLATED, INTERIOR, BOUNDARY, SEVERAL_FANS = 0, 1, 2, 3
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel
+def checked(given, n, faces):
+    """Copy (m, 3 or 4) faces to (m, 4) int32, -1 being added to triangles, and look for bad ones.
+
+    Returns
+    -------
+    (first, count), (first, count)
+        Faces with an index outside 0..n - 1, and faces with a repeated vertex.
+    """
+    outside, n_outside, repeated, n_repeated = -1, 0, -1, 0
+    for f in range(given.shape[0]):
+        h, i, j = given[f, 0], given[f, 1], given[f, 2]
+        k = given[f, 3] if given.shape[1] == 4 else -1
+        faces[f, 0], faces[f, 1], faces[f, 2], faces[f, 3] = h, i, j, k
+        if min(h, i, j) < 0 or k < -1 or max(h, i, j, k) >= n:
+            outside = f if n_outside == 0 else outside
+            n_outside += 1
+        if h == i or i == j or j == h or k in (h, i, j):
+            repeated = f if n_repeated == 0 else repeated
+            n_repeated += 1
+    return (outside, n_outside), (repeated, n_repeated)
+
+
+@kernel
 def corners_by_vertex(faces, n):
     """Counting sort of all corners by their vertex: (indptr, corners)."""
     indptr = np.zeros(n + 1, np.int64)
@@ -19,18 +46,151 @@ def corners_by_vertex(faces, n):
                 indptr[faces[f, s] + 1] += 1
     for i in range(n):
         indptr[i + 1] += indptr[i]
-    fill = indptr[:-1].copy()
-    corners = np.empty(indptr[n], np.int64)
+    corners = np.empty(indptr[n], np.int32)
+    # indptr itself counts up where the next corner goes, and so ends up one vertex ahead.
     for f in range(faces.shape[0]):
         for s in range(4):
             v = faces[f, s]
             if v >= 0:
-                corners[fill[v]] = 4 * f + s
-                fill[v] += 1
+                corners[indptr[v]] = 4 * f + s
+                indptr[v] += 1
+    for i in range(n, 0, -1):
+        indptr[i] = indptr[i - 1]
+    indptr[0] = 0
     return indptr, corners
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel
+def regular_rings(faces, indptr, corners, ring, start, stop):
+    """Rings (a, d, a, d, ...) of vertices start..stop inside four quads that run the same way round.
+
+    Counter-clockwise from the first corner, eight vertices. A first entry of -1 marks all other vertices.
+    """
+    for v in range(start, stop):
+        begin = indptr[v]
+        ring[v, 0] = -1
+        if indptr[v + 1] - begin != 4:
+            continue
+        f, s = corners[begin] >> 2, corners[begin] & 3
+        first, exit_ = faces[f, (s + 1) & 3], faces[f, (s + 3) & 3]
+        ring[v, 1] = faces[f, (s + 2) & 3]
+        ok = faces[f, 3] >= 0
+        for turn in range(1, 4):
+            found = False
+            for k in range(begin + 1, begin + 4):
+                f, s = corners[k] >> 2, corners[k] & 3
+                if faces[f, (s + 1) & 3] == exit_:
+                    found = faces[f, 3] >= 0
+                    break
+            if not found or exit_ == first:
+                ok = False
+                break
+            ring[v, 2 * turn], ring[v, 2 * turn + 1] = exit_, faces[f, (s + 2) & 3]
+            exit_ = faces[f, (s + 3) & 3]
+        if not ok or exit_ != first:
+            continue
+        ring[v, 0] = first
+        for k in range(1, 8, 2):
+            for j in range(8):
+                ok &= j == k or ring[v, j] != ring[v, k]
+        if not ok:
+            ring[v, 0] = -1
+
+
+def rings(faces, indptr, corners):
+    """Ring (n, 8) int32 of every vertex, see `regular_rings`."""
+    n = indptr.size - 1
+    ring = np.empty((n, 8), np.int32)
+    parallel.over(partial(regular_rings, faces, indptr, corners, ring), n, n)
+    return ring
+
+
+@kernel
+def mean_distance(ring):
+    """Mean distance in memory of a regular vertex and its first neighbour, in vertices; of every 16th."""
+    total = count = 0
+    for v in range(0, ring.shape[0], 16):
+        if ring[v, 0] >= 0:
+            total += abs(ring[v, 0] - v)
+            count += 1
+    return total / max(count, 1)
+
+
+@kernel
+def surroundings(faces, vertices, n, reach):
+    """Faces that one comes to from the vertices in `reach` steps from face to face, in their order."""
+    level = np.full(n, reach, np.uint8)
+    for v in vertices:
+        level[v] = 0
+    kept = np.zeros(faces.shape[0], np.bool_)
+    for step in range(reach):
+        for f in range(faces.shape[0]):
+            if kept[f]:
+                continue
+            sides = 3 if faces[f, 3] < 0 else 4
+            for s in range(sides):
+                if level[faces[f, s]] <= step:
+                    kept[f] = True
+            if kept[f]:
+                for s in range(sides):
+                    level[faces[f, s]] = min(level[faces[f, s]], step + 1)
+    return np.flatnonzero(kept)
+
+
+def part_around(faces, vertices, n, reach):
+    """Part of a mesh, `reach` faces beyond some vertices: its vertices, these first, and faces over them."""
+    near = faces[surroundings(faces, vertices, n, reach)]
+    known = np.zeros(n, np.bool_)
+    known[near[near >= 0]] = True
+    known[vertices] = False
+    kept = np.concatenate((vertices, np.flatnonzero(known)))
+    place = np.full(n + 1, -1, np.int32)  # the last one, which -1 reads, stays -1
+    place[kept] = np.arange(kept.size)
+    return kept, place[near]
+
+
+@kernel
+def nearby_order(ring):
+    """Vertices in breadth-first order along the edges of regular vertices: neighbours come close together."""
+    n = ring.shape[0]
+    order = np.empty(n, np.int32)
+    queued = np.zeros(n, np.bool_)
+    size = head = 0
+    for root in range(n):
+        if queued[root]:
+            continue
+        order[size], queued[root] = root, True
+        size += 1
+        while head < size:
+            v = order[head]
+            head += 1
+            if ring[v, 0] < 0:
+                continue
+            for k in range(0, 8, 2):
+                x = ring[v, k]
+                if not queued[x]:
+                    order[size], queued[x] = x, True
+                    size += 1
+    return order
+
+
+@kernel
+def renumbered(ring, order):
+    """Rings in another order, their vertices numbered by place in it."""
+    place = np.empty(order.size, np.int32)
+    for k in range(order.size):
+        place[order[k]] = k
+    moved = np.empty_like(ring)
+    for k in range(order.size):
+        v = order[k]
+        moved[k, 0] = -1
+        if ring[v, 0] >= 0:
+            for j in range(8):
+                moved[k, j] = place[ring[v, j]]
+    return moved
+
+
+@helper
 def neighbours(faces, corner):
     """Next and previous edge neighbour of the vertex at a corner."""
     f, s = corner // 4, corner % 4
@@ -38,14 +198,14 @@ def neighbours(faces, corner):
     return faces[f, (s + 1) % sides], faces[f, (s + sides - 1) % sides]
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
-def order_rings(faces, indptr, corners):
-    """Sort each vertex's corners in place into its fan, counter-clockwise from a boundary if it has one.
+@kernel
+def order_rings(faces, indptr, corners, vertices):
+    """Sort the corners of some vertices in place into fans, counter-clockwise from a boundary if any.
 
     Returns
     -------
     kind : (n,) uint8
-        ISOLATED, INTERIOR, BOUNDARY or SEVERAL_FANS.
+        ISOLATED, INTERIOR, BOUNDARY or SEVERAL_FANS; INTERIOR for all vertices not asked for.
     flipped : (number of corners,) bool
         Corners that run against the first one of their fan.
     bad_edge : (3,) int64
@@ -54,20 +214,21 @@ def order_rings(faces, indptr, corners):
         Interior edges whose two faces run the same way along them.
     """
     n = indptr.size - 1
-    kind = np.zeros(n, np.uint8)
+    kind = np.full(n, INTERIOR, np.uint8)
     flipped = np.zeros(corners.size, np.bool_)
     bad_edge = np.array([-1, -1, 0])
     n_disagree = 0
     # One entry a neighbour, stamped with the vertex at hand: a pole costs O(valence), not its square.
-    stamp = np.full(n, -1, np.int64)
+    stamp = np.full(n, -1, np.int32)
     first = np.empty(n, np.int64)
     second = np.empty(n, np.int64)
     count = np.empty(n, np.int64)
     role = np.empty(n, np.int64)  # of the first corner's: 0 where it is "next", 1 where "previous"
-    for v in range(n):
+    for v in vertices:
         begin, end = indptr[v], indptr[v + 1]
         valence = end - begin
         if valence == 0:
+            kind[v] = ISOLATED
             continue
         for k in range(begin, end):
             for r, x in enumerate(neighbours(faces, corners[k])):
@@ -115,7 +276,7 @@ def order_rings(faces, indptr, corners):
     return kind, flipped, bad_edge, n_disagree
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel
 def colour(faces, indptr, corners, n):
     """Colour vertices 0..n-1, no two along an edge of a quad alike; -1 for all others.
 

@@ -2,14 +2,30 @@
 
 from __future__ import annotations
 
-from quadcurv.schemes.base import Scheme
+from quadcurv.schemes.base import Curvatures, Fit, Scheme, StandardErrors
 from quadcurv.schemes.cotan import cotan
 from quadcurv.schemes.finite_volume import FINITE_VOLUME
+from quadcurv.schemes.fundamental_forms import fundamental_forms
+from quadcurv.schemes.jet import jet
 from quadcurv.schemes.liu import LIU
+from quadcurv.schemes.polygon import alexa_wardetzky, bunge, de_goes
 
-__all__ = ["SCHEMES", "Scheme", "as_scheme", "cotan"]
+__all__ = [
+    "SCHEMES",
+    "Curvatures",
+    "Fit",
+    "Scheme",
+    "StandardErrors",
+    "alexa_wardetzky",
+    "as_scheme",
+    "bunge",
+    "cotan",
+    "de_goes",
+    "fundamental_forms",
+    "jet",
+]
 
-SCHEMES: dict[str, Scheme] = {
+SCHEMES: dict[str, Scheme | Fit] = {
     scheme.name: scheme
     for scheme in (
         FINITE_VOLUME,
@@ -20,11 +36,16 @@ SCHEMES: dict[str, Scheme] = {
         cotan(4, "voronoi"),
         cotan(6, "voronoi"),
         cotan(8, "voronoi"),
+        bunge(),
+        de_goes(),
+        alexa_wardetzky(),
+        jet(2),
+        jet(),
     )
 }
 
 
-def as_scheme(scheme: str | Scheme) -> Scheme:
+def as_scheme(scheme: str | Scheme | Fit) -> Scheme | Fit:
     """Return the scheme of that name, or the scheme itself.
 
     Raises
@@ -32,7 +53,7 @@ def as_scheme(scheme: str | Scheme) -> Scheme:
     ValueError
         The name is not in ``SCHEMES``.
     """
-    if isinstance(scheme, Scheme):
+    if isinstance(scheme, Scheme | Fit):
         return scheme
     if scheme not in SCHEMES:
         raise ValueError(f"scheme: expected one of {', '.join(SCHEMES)}, got {scheme!r}")

@@ -1,13 +1,14 @@
-"""What a scheme is: a stiffness matrix and a dual area at every vertex."""
+"""What a scheme is: a stiffness matrix and a dual area at every vertex, or a fit that has neither."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any, NamedTuple
 
-from scipy import sparse
+import scipy
 
-from quadcurv.mesh import Floats, Stencils
+from quadcurv.mesh import Floats, Ints, Mesh, Stencils
 
 
 @dataclass(frozen=True)
@@ -29,10 +30,82 @@ class Scheme:
         Stencils -> (S, A): csr_array (n, p) and float64 (n,).
     apply : callable
         Stencils -> (-S x, A): float64 (n, 3) and (n,), without building S where that can be avoided.
+    write : callable, optional
+        (mesh, frame, results) -> None: the same in one compiled pass, divided and signed, into the arrays
+        of `results` by name. At all vertices of a grid that `frame` surrounds, or at the regular vertices
+        inside a face list. What :func:`quadcurv.evaluate` makes of `apply` is what it is tested against.
+    stiffness : callable, optional
+        (Stencils, out) -> S alone, into the arrays of `out`, a matrix of the same pattern, if not None.
     """
 
     name: str
     order: int
     reference: str
-    assemble: Callable[[Stencils], tuple[sparse.csr_array, Floats]]
+    assemble: Callable[[Stencils], tuple[scipy.sparse.csr_array, Floats]]
     apply: Callable[[Stencils], tuple[Floats, Floats]]
+    write: Callable[[Mesh, Any, dict[str, Floats]], None] | None = None
+    stiffness: Callable[[Stencils, scipy.sparse.csr_array | None], scipy.sparse.csr_array] | None = None
+
+
+class StandardErrors(NamedTuple):
+    """One standard deviation of H, K, k1 and k2, of the shape of these."""
+
+    mean: Floats
+    gaussian: Floats
+    k1: Floats
+    k2: Floats
+
+
+@dataclass(frozen=True, eq=False)
+class Curvatures:
+    """All a fit knows at the vertices, (n,) or (r, c); NaN where it has no answer.
+
+    Attributes
+    ----------
+    mean, gaussian : float64
+        H in 1 / length, positive where the surface bends away from its normal, and K in 1 / length^2.
+    k1, k2 : float64
+        Principal curvatures in 1 / length with the sign of H, k1 >= k2.
+    direction1, direction2 : (..., 3) float64
+        Unit tangents of k1 and k2. Their signs are arbitrary, direction1 x direction2 = normal; at an
+        umbilic any two orthogonal tangents.
+    normal : (..., 3) float64
+        Unit normal of the fitted surface.
+    standard_error : StandardErrors or None
+        From the fit's residuals, for errors of the positions along the normal that are independent and
+        of equal size: noise, not what a smooth surface leaves. NaN where a fit has no residuals.
+    noise : float64 or None
+        Standard deviation of the positions along the normal, from the residuals, in length.
+    degree, rings : int32 or None
+        Degree and neighbourhood of the fit at each vertex, 0 where there is none.
+    """
+
+    mean: Floats
+    gaussian: Floats
+    k1: Floats
+    k2: Floats
+    direction1: Floats
+    direction2: Floats
+    normal: Floats
+    standard_error: StandardErrors | None = None
+    noise: Floats | None = None
+    degree: Ints | None = None
+    rings: Ints | None = None
+
+
+@dataclass(frozen=True)
+class Fit:
+    """A scheme that fits a surface around every vertex: all curvatures at once, and no matrix.
+
+    Attributes
+    ----------
+    name, order, reference
+        As for `Scheme`.
+    curvatures : callable
+        (mesh, boundary) -> Curvatures, boundary as for :func:`quadcurv.stencils`.
+    """
+
+    name: str
+    order: int
+    reference: str
+    curvatures: Callable[[Mesh, str], Curvatures]

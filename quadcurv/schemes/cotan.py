@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy import sparse
 
 from quadcurv.mesh import Bools, Floats, Ints, Stencils
 from quadcurv.schemes.base import Scheme
@@ -48,15 +48,15 @@ def cotan(valence: int = 6, area: str = "barycentric", diagonal: int = 0) -> Sch
     if diagonal and valence != 6:
         raise ValueError(f"diagonal: only valence 6 has a choice of diagonals, got valence {valence}")
 
-    def assemble(stencils: Stencils) -> tuple[sparse.csr_array, Floats]:
+    def assemble(stencils: Stencils) -> tuple[scipy.sparse.csr_array, Floats]:
         p, n = len(stencils.points), stencils.n
-        stiffness, areas = sparse.csr_array((n, p)), np.zeros(n)
+        stiffness, areas = scipy.sparse.csr_array((n, p)), np.zeros(n)
         for triangles, served in _triangulations(stencils, valence, diagonal):
             S, A = cotan_matrices(stencils.points, triangles, area)
             if served.all():
                 return S[:n], A[:n]
             rows = np.flatnonzero(served)
-            place = sparse.csr_array((np.ones(rows.size), (rows, np.arange(rows.size))), (n, rows.size))
+            place = scipy.sparse.csr_array((np.ones(rows.size), (rows, np.arange(rows.size))), (n, rows.size))
             stiffness = stiffness + place @ S[rows]
             areas[served] = A[:n][served]
         return stiffness, areas
@@ -77,13 +77,13 @@ def cotan(valence: int = 6, area: str = "barycentric", diagonal: int = 0) -> Sch
     return Scheme(name, 2 if valence == 6 else 0, reference, assemble, apply)
 
 
-def cotan_matrices(points: Floats, triangles: Ints, area: str) -> tuple[sparse.csr_array, Floats]:
+def cotan_matrices(points: Floats, triangles: Ints, area: str) -> tuple[scipy.sparse.csr_array, Floats]:
     """Positive semi-definite (p, p) cotan stiffness and (p,) dual areas, from libigl."""
     import igl
 
     kind = igl.MASSMATRIX_TYPE_VORONOI if area == "voronoi" else igl.MASSMATRIX_TYPE_BARYCENTRIC
     faces = np.ascontiguousarray(triangles, dtype=np.int64)
-    stiffness = sparse.csr_array(-igl.cotmatrix(points, faces))
+    stiffness = scipy.sparse.csr_array(-igl.cotmatrix(points, faces))
     areas = igl.massmatrix(points, faces, kind).diagonal()
     return stiffness, np.pad(areas, (0, len(points) - areas.size))  # libigl ends at the last vertex used
 

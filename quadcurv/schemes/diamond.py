@@ -1,11 +1,17 @@
-"""The stiffness that the finite-volume scheme and Liu's formula share: S = sum over quads of B^T K B."""
+"""What the finite-volume scheme and Liu's formula share.
+
+Their stiffness, S = sum over quads of B^T K B, and the pass over grids and face lists that does without it.
+"""
 
 from __future__ import annotations
 
-import numpy as np
-from scipy import sparse
+from collections.abc import Callable
+from functools import partial
 
-from quadcurv.mesh import Floats, Ints, Stencils
+import numpy as np
+import scipy
+
+from quadcurv.mesh import Floats, Frame, Ints, Mesh, QuadGrid, QuadMesh, Stencils
 
 # Diagonals (u, v) of a quad from its four vertices.
 _B = np.array([[-1.0, 0.0, 1.0, 0.0], [0.0, -1.0, 0.0, 1.0]])
@@ -18,14 +24,101 @@ def local_stiffness(points: Floats, quads: Ints) -> Floats:
     return np.einsum("ai,mab,bj->mij", _B, diamond.conductances(points, quads), _B, optimize=True)
 
 
-def scatter(local: Floats, rows: Ints, columns: Ints, shape: tuple[int, int]) -> sparse.csr_array:
+def scatter(local: Floats, rows: Ints, columns: Ints, shape: tuple[int, int]) -> scipy.sparse.csr_array:
     """Sum local matrices (m, i, j) with vertices rows (m, i) and columns (m, j) into one."""
     i, j = np.broadcast_arrays(rows[:, :, None], columns[:, None, :])
-    return sparse.csr_array((local.ravel(), (i.ravel(), j.ravel())), shape=shape)
+    return scipy.sparse.csr_array((local.ravel(), (i.ravel(), j.ravel())), shape=shape)
 
 
-def quad_stiffness(stencils: Stencils) -> sparse.csr_array:
+def stiffness(
+    stencils: Stencils,
+    out: scipy.sparse.csr_array | None = None,
+    *,
+    general: Callable[[Stencils], scipy.sparse.csr_array],
+) -> scipy.sparse.csr_array:
+    """(n, p) stiffness: regular rows straight into CSR, the others by `general` on the faces around them.
+
+    `general` gives the rows of all vertices of its stencils. The arrays of `out`, of the same pattern, are
+    written to.
+    """
+    from quadcurv.kernels import diamond, parallel, topology
+
+    n, p, ring = stencils.n, len(stencils.points), stencils.ring
+    others = np.flatnonzero(ring[:n, 0] < 0)
+    indptr, rows = 9 * np.arange(n + 1), None
+    if others.size:
+        size = np.full(n, 9)
+        vertices, faces = topology.part_around(stencils.faces, others, p, 2)
+        closed = np.zeros(vertices.size, bool)
+        part = Stencils(stencils.points[vertices], faces, (vertices.size,), closed, stencils.orientable)
+        rows = scipy.sparse.csr_array(general(part)[: others.size])
+        rows = scipy.sparse.csr_array((rows.data, vertices[rows.indices], rows.indptr), (others.size, p))
+        rows.sort_indices()
+        size[others] = np.diff(rows.indptr)
+        np.cumsum(size, out=indptr[1:])
+    if indptr[-1] > np.iinfo(np.int32).max:
+        return general(stencils)[:n]
+    indptr = indptr.astype(np.int32)
+    if out is None:
+        arrays = np.empty(indptr[-1]), np.empty(indptr[-1], np.int32), indptr
+        out = scipy.sparse.csr_array(arrays, (n, p))
+    elif out.shape != (n, p) or not np.array_equal(out.indptr, indptr):
+        raise ValueError("out: expected a stiffness matrix of the same mesh and scheme")
+    if rows is not None:
+        place = np.repeat(indptr[others] - rows.indptr[:-1], np.diff(rows.indptr)) + np.arange(rows.nnz)
+        out.indices[place], out.data[place] = rows.indices, rows.data
+    kernel = partial(diamond.ring_stiffness, stencils.points.ravel(), ring, indptr, out.indices, out.data)
+    parallel.over(kernel, n, n, diamond.BLOCK)
+    return out
+
+
+def quad_stiffness(stencils: Stencils) -> scipy.sparse.csr_array:
     """(p, p) stiffness of all quads, triangles left out."""
     p = len(stencils.points)
     quads = stencils.faces[stencils.faces[:, 3] >= 0]
     return scatter(local_stiffness(stencils.points, quads), quads, quads, (p, p))
+
+
+def write(mesh: Mesh, frame: Frame | None, results: dict[str, Floats], *, liu: int | None) -> None:
+    """Run the kernels: see `Scheme.write`; liu is 0 for Liu's dual area, None for the ring polygon's."""
+    from quadcurv.kernels import diamond, parallel
+
+    names = ("mean_curvature_normal", "mean_curvature", "vertex_normals", "dual_areas")
+    wanted = [results[name].ravel() if name in results else None for name in names]
+    if isinstance(mesh, QuadMesh):
+        _write_rings(mesh, liu, wanted)
+        return
+    assert frame is not None
+    r, c = mesh.shape
+    if isinstance(mesh, QuadGrid):
+        kernel = partial(diamond.vertices, mesh.points.reshape(r, -1), *frame, liu, *wanted)
+    else:
+        dual = mesh.dual
+        for axis in (0, 1):
+            first, last = (dual.take(i, axis) for i in (0, -1))
+            if mesh.wrap[axis] and not np.array_equal(first, last):  # the seam is that of the first
+                dual = np.concatenate(
+                    (dual.take(range(mesh.shape[axis]), axis), first[None].swapaxes(0, axis)), axis
+                )
+        points = mesh.primal.reshape(len(mesh.primal), -1)
+        halo = int(mesh.has_ghosts)
+        kernel = partial(diamond.cells, points, *frame, halo, dual.reshape(r + 1, -1), liu, *wanted)
+    parallel.over(kernel, r, r * c, diamond.LEAST_ROWS)
+
+
+def _write_rings(mesh: QuadMesh, liu: int | None, wanted: list[Floats | None]) -> None:
+    """Regular vertices, in an order that keeps neighbours close where the mesh's own does not."""
+    from quadcurv.kernels import diamond, parallel
+
+    n = len(mesh.points)
+    order, ring = mesh.ring_order()
+    if order is None:
+        parallel.over(partial(diamond.rings, mesh.points.ravel(), ring, liu, *wanted), n, n, diamond.BLOCK)
+        return
+    points = np.empty_like(mesh.points)
+    parallel.over(partial(diamond.gather, mesh.points, order, points), n, n)
+    ordered = [None if w is None else np.empty_like(w) for w in wanted]
+    parallel.over(partial(diamond.rings, points.ravel(), ring, liu, *ordered), n, n, diamond.BLOCK)
+    for w, o in zip(wanted, ordered, strict=True):
+        if w is not None and o is not None:
+            parallel.over(partial(diamond.scatter, o.reshape(n, -1), order, w.reshape(n, -1)), n, n)

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 import numpy as np
-from scipy import sparse
+import scipy
 
 from quadcurv.mesh import Floats, Ints, Stencils, face_pairs
 from quadcurv.schemes.base import Scheme
-from quadcurv.schemes.diamond import local_stiffness, quad_stiffness, scatter
+from quadcurv.schemes.diamond import local_stiffness, quad_stiffness, scatter, stiffness, write
 
 
-def _flaps(stencils: Stencils) -> tuple[Ints, sparse.csr_array]:
+def _flaps(stencils: Stencils) -> tuple[Ints, scipy.sparse.csr_array]:
     """Corners (c, a, d, b) of triangles, d numbered from p on, and the matrix that places these d.
 
     d is the mean of the vertices across the edge (a, b), a + b - c where nothing lies across: on a mesh
@@ -36,11 +38,11 @@ def _flaps(stencils: Stencils) -> tuple[Ints, sparse.csr_array]:
     columns = np.concatenate((far[:, 0], far[:, 1], a[alone], b[alone], c[alone]))
     ones = np.ones(alone.size)
     values = np.concatenate((np.full(2 * flap.size, 0.5), ones, ones, -ones))
-    place = sparse.csr_array((values, (rows, columns)), shape=(c.size, p))
+    place = scipy.sparse.csr_array((values, (rows, columns)), shape=(c.size, p))
     return np.stack((c, a, np.arange(p, p + c.size, dtype=np.int32), b), axis=1), place
 
 
-def _flap_points(stencils: Stencils) -> tuple[Ints, sparse.csr_array, Floats]:
+def _flap_points(stencils: Stencils) -> tuple[Ints, scipy.sparse.csr_array, Floats]:
     """Triangle corners as `_flaps`, and all points with the d of these corners appended."""
     corners, place = _flaps(stencils)
     origin = stencils.points[0]
@@ -63,17 +65,27 @@ def _apply(stencils: Stencils) -> tuple[Floats, Floats]:
     return flux[: stencils.n], _dual_areas(stencils)
 
 
-def _assemble(stencils: Stencils) -> tuple[sparse.csr_array, Floats]:
-    stiffness = quad_stiffness(stencils)
+def _rows(stencils: Stencils) -> scipy.sparse.csr_array:
+    S = quad_stiffness(stencils)
     if stencils.has_triangles:
         corners, place, points = _flap_points(stencils)
         p = len(stencils.points)
         row = local_stiffness(points, corners)[:, :1]
         flaps = scatter(row, corners[:, :1], corners, (p, len(points)))
-        stiffness = stiffness + flaps[:, :p] + flaps[:, p:] @ place
-    return stiffness[: stencils.n], _dual_areas(stencils)
+        S = S + flaps[:, :p] + flaps[:, p:] @ place
+    return S
+
+
+def _assemble(stencils: Stencils) -> tuple[scipy.sparse.csr_array, Floats]:
+    return stiffness(stencils, general=_rows), _dual_areas(stencils)
 
 
 FINITE_VOLUME = Scheme(
-    "finite_volume", 2, "Hutchins 2013, eq. 3.16-3.35; Calhoun and Helzel 2009", _assemble, _apply
+    "finite_volume",
+    2,
+    "Hutchins 2013, eq. 3.16-3.35; Calhoun and Helzel 2009",
+    _assemble,
+    _apply,
+    partial(write, liu=None),
+    partial(stiffness, general=_rows),
 )

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 import numpy as np
-from scipy import sparse
+import scipy
 
 from quadcurv.mesh import Floats, Stencils
 from quadcurv.schemes.base import Scheme
 from quadcurv.schemes.cotan import cotan_matrices
-from quadcurv.schemes.diamond import quad_stiffness
+from quadcurv.schemes.diamond import quad_stiffness, stiffness, write
 
 
 def _apply(stencils: Stencils) -> tuple[Floats, Floats]:
@@ -21,12 +23,24 @@ def _apply(stencils: Stencils) -> tuple[Floats, Floats]:
     return flux[: stencils.n], area[: stencils.n]
 
 
-def _assemble(stencils: Stencils) -> tuple[sparse.csr_array, Floats]:
-    stiffness = quad_stiffness(stencils)
+def _rows(stencils: Stencils) -> scipy.sparse.csr_array:
+    S = quad_stiffness(stencils)
     if stencils.has_triangles:
         triangles = stencils.faces[stencils.faces[:, 3] < 0, :3]
-        stiffness = stiffness + cotan_matrices(stencils.points, triangles, "barycentric")[0]
-    return stiffness[: stencils.n], _apply(stencils)[1]
+        S = S + cotan_matrices(stencils.points, triangles, "barycentric")[0]
+    return S
 
 
-LIU = Scheme("liu", 2, "Liu, Xu and Zhang 2008, eq. 2.4 and 2.10 (thesis, eq. 4.4-4.7)", _assemble, _apply)
+def _assemble(stencils: Stencils) -> tuple[scipy.sparse.csr_array, Floats]:
+    return stiffness(stencils, general=_rows), _apply(stencils)[1]
+
+
+LIU = Scheme(
+    "liu",
+    2,
+    "Liu, Xu and Zhang 2008, eq. 2.4 and 2.10 (thesis, eq. 4.4-4.7)",
+    _assemble,
+    _apply,
+    partial(write, liu=0),
+    partial(stiffness, general=_rows),
+)

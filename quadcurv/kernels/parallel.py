@@ -1,0 +1,82 @@
+"""Serial, nogil kernels over ranges, by a few threads.
+
+Ranges rather than numba's own parallel loops: those kill the children of a fork (OpenMP) or abort under
+concurrent callers (workqueue). A kernel gives bitwise the same for any cut into ranges.
+"""
+
+import os
+from itertools import pairwise
+
+SERIAL_BELOW = 200_000  # vertices; less work does not pay for waking a thread
+_pool = None
+_threads = None
+
+
+def _available():
+    """Cores that this process may use."""
+    try:
+        return len(os.sched_getaffinity(0))
+    except AttributeError:  # not on Linux
+        return os.cpu_count() or 1
+
+
+def threads():
+    """Number of threads in use: `set_threads`, QUADCURV_NUM_THREADS, or the cores of this process."""
+    if _threads is not None:
+        return _threads
+    try:
+        return max(1, int(os.environ["QUADCURV_NUM_THREADS"]))
+    except (KeyError, ValueError):
+        return _available()
+
+
+def set_threads(number: int | None) -> None:
+    """Set how many threads a call on a large mesh uses; smaller meshes are computed by the caller's own.
+
+    Parameters
+    ----------
+    number : int or None
+        At least 1. None: what the environment variable QUADCURV_NUM_THREADS says, else all cores that the
+        process may use. Results do not depend on it.
+
+    Raises
+    ------
+    ValueError
+        Less than 1.
+    """
+    global _threads
+    if number is not None and number < 1:
+        raise ValueError(f"number: expected at least 1 thread, got {number}")
+    _threads = number
+
+
+def _forget_pool():
+    global _pool
+    _pool = None
+
+
+if hasattr(os, "register_at_fork"):  # threads do not survive a fork: a child begins without a pool
+    os.register_at_fork(after_in_child=_forget_pool)
+
+
+def over(kernel, size, work, least=1):
+    """Call kernel(start, stop) on ranges that make up 0..size; `work` vertices in all, `least` a range."""
+    global _pool
+    count = threads()
+    if count == 1 or work < SERIAL_BELOW or size < 2 * least:
+        kernel(0, size)
+        return
+    # A few ranges a thread, so that one that is held up does not hold up all.
+    parts = min(4 * count, size // least)
+    cuts = [size * k // parts for k in range(parts + 1)]
+    from concurrent.futures import ThreadPoolExecutor  # not needed by small meshes
+
+    if _pool is None or _pool._max_workers != count:
+        _pool = ThreadPoolExecutor(count, thread_name_prefix="quadcurv")
+    try:
+        ranges = [_pool.submit(kernel, *cut) for cut in pairwise(cuts)]
+    except RuntimeError:  # the interpreter shuts down, or the system has no thread left
+        kernel(0, size)
+        return
+    for done in ranges:
+        done.result()

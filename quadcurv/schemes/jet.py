@@ -1,0 +1,272 @@
+"""Polynomial fits over the neighbourhood of every vertex: "jets"."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from quadcurv.boundary import BOUNDARIES, ghost_layer
+from quadcurv.mesh import Bools, Floats, Ints, Mesh, QuadGrid, QuadMesh
+from quadcurv.schemes.base import Curvatures, Fit, StandardErrors
+
+# Least part of a term's square that the terms eliminated before it may leave: 1e-2 on a lattice as on any
+# sound neighbourhood, nothing where a term is a combination of the others.
+_CONDITION = {2: 20.0, 3: 60.0, 4: 220.0}
+_GROWTH = 3
+_GHOST_DEGREE, _GHOST_LAYERS = 5, 2
+# Of a spacing. Ghosts amplify: those of jittered or noisy grids are worse than one-sided fits.
+_ROUGH = 2e-3
+# Of one fit, in vertices of the finite-volume scheme.
+_WORK = 30
+
+_REFERENCE = "Cazals and Pouget 2005"
+_CANDIDATES = (
+    *((4, r) for r in range(2, 9)),
+    *((3, r) for r in range(2, 8)),
+    *((2, r) for r in range(2, 7)),
+)
+_SAMPLE, _LEAST_SAMPLE = 3000, 100
+
+# Vertices (k,), degree, rings -> results (k, COLUMNS).
+Run = Callable[[NDArray[np.int64], int, int], Floats]
+
+
+def jet(degree: int | Literal["auto"] = 4, rings: int | None = None) -> Fit:
+    """Polynomial of height over the tangent plane, by least squares over rings of neighbours.
+
+    Parameters
+    ----------
+    degree : {2, 3, 4} or "auto"
+        "auto" chooses degree and rings for the mesh at hand: those of the least error in the mean curvature
+        as far as the fits of a sample of vertices tell, noise by their standard errors and bias by
+        differences between fits.
+    rings : int, optional
+        Rings of faces around a vertex whose vertices are fitted, on a grid the window of
+        (2 rings + 1)^2 points. By default 1 for degree 2 and 2 for the others.
+
+    Returns
+    -------
+    Fit
+        Curvature of order `degree` on smooth meshes of even degree, `degree` - 1 on irregular ones.
+        Where the vertices of the rings do not determine the polynomial well, up to three more rings
+        are taken, and if that does not help the degree is lowered; ``Curvatures.degree`` and ``.rings``
+        report it. With boundary="extrapolate" the open sides of a smooth grid get as many ghost layers as
+        rings, of quintic extrapolation, if these are no more than two; all other boundaries, and those of
+        grids that the extrapolation does not fit, one-sided fits.
+
+    Raises
+    ------
+    ValueError
+        Any other degree, fewer than one ring, or rings with "auto".
+
+    References
+    ----------
+    F. Cazals, M. Pouget (2005), Estimating differential quantities using polynomial fitting of
+    osculating jets, Computer Aided Geometric Design 22, 121-146.
+    """
+    if degree == "auto":
+        if rings is not None:
+            raise ValueError(f'rings: chosen with degree "auto", got {rings!r}')
+        return Fit("jet-auto", 4, _REFERENCE, _chosen_curvatures)
+    if degree not in _CONDITION:
+        raise ValueError(f'degree: expected "auto" or one of {tuple(_CONDITION)}, got {degree!r}')
+    if rings is None:
+        rings = 1 if degree == 2 else 2
+    elif rings != int(rings) or rings < 1:
+        raise ValueError(f"rings: expected a whole number, at least 1, got {rings!r}")
+    standard = (degree, rings) in ((2, 1), (3, 2), (4, 2))
+    name = "jet" if degree == 4 else f"jet-{degree}"
+    return Fit(
+        name if standard else f"jet-{degree}-{rings}",
+        2 if degree < 4 else 4,
+        _REFERENCE,
+        lambda mesh, boundary: _curvatures(mesh, boundary, degree, rings),
+    )
+
+
+def _curvatures(mesh: Mesh, boundary: str, degree: int, rings: int) -> Curvatures:
+    if boundary not in BOUNDARIES:
+        raise ValueError(f"boundary: expected one of {BOUNDARIES}, got {boundary!r}")
+    stencils = mesh.stencils()
+    if isinstance(mesh, QuadGrid):
+        wanted, run = _on_grid(mesh, rings if boundary == "extrapolate" else 0)
+    else:
+        wanted, run = _on_faces(mesh)
+    if boundary == "nan":
+        wanted &= stencils.closed
+    out, degrees, grown = _fits(wanted, run, degree, rings)
+    return _unpacked(out, degrees, grown, stencils.shape, stencils.orientable)
+
+
+def _chosen_curvatures(mesh: Mesh, boundary: str) -> Curvatures:
+    wanted, run = _on_grid(mesh, 0) if isinstance(mesh, QuadGrid) else _on_faces(mesh)
+    return _curvatures(mesh, boundary, *_choice(np.flatnonzero(wanted), run))
+
+
+def _choice(vertices: NDArray[np.int64], run: Run) -> tuple[int, int]:
+    """Degree and rings of the least risk, the mean square of noise and bias in H, over a sample of vertices.
+
+    With H the mean curvature by a fit and H' by one of no lower degree over no more rings, H' - H is
+    uncorrelated with the noise of H, the best linear estimate of all (Gauss and Markov). Hence the mean of
+    (H' - H)^2 is var H' - var H and the square of the bias, less that of H' (Hausman 1978).
+    """
+    from quadcurv.kernels import jet as kernel
+
+    if vertices.size > _SAMPLE:
+        vertices = np.random.default_rng(0).choice(vertices, _SAMPLE, replace=False)
+    fits = {(d, r): run(vertices, d, r) for d, r in _CANDIDATES}
+    with np.errstate(invalid="ignore"):
+        sound = {
+            c: (f[:, kernel.CONDITION] < _CONDITION[c[0]]) & (f[:, kernel.SIGMA] > 0) for c, f in fits.items()
+        }
+    # Those that most vertices have room for, at the vertices that have room for all of these.
+    fits = {c: f for c, f in fits.items() if sound[c].mean() > 0.5}
+    kept = np.all([sound[c] for c in fits], axis=0) if fits else np.zeros(0, bool)
+    if kept.sum() < _LEAST_SAMPLE:
+        return _CANDIDATES[0]
+    H = {c: f[kept, kernel.MEAN] for c, f in fits.items()}
+    error2 = {c: np.mean(f[sound[c], kernel.ERROR]) ** 2 for c, f in fits.items()}  # one-sided ones too
+    sigma2 = {c: np.mean(f[kept, kernel.SIGMA] ** 2) for c, f in fits.items()}
+    noise2 = min(sigma2[c] for c in list(fits)[:2])  # of the highest degree over the fewest rings
+    variance = {
+        c: noise2 * np.mean((f[kept, kernel.ERROR] / f[kept, kernel.SIGMA]) ** 2) for c, f in fits.items()
+    }
+
+    def risk(c: tuple[int, int]) -> float:
+        bias2 = 0.0
+        for b in fits:
+            if b != c and b[0] >= c[0] and b[1] <= c[1]:
+                # What chance gives: fits nearer than their windows' width have their noise in common.
+                chance = variance[b] * (2 * b[1] + 1) / np.sqrt(kept.sum())
+                bias2 = max(bias2, np.mean((H[b] - H[c]) ** 2) - (variance[b] - variance[c]) - chance)
+        return error2[c] + bias2
+
+    return min(fits, key=risk)
+
+
+def _fits(wanted: Bools, run: Run, degree: int, rings: int) -> tuple[Floats, Ints, Ints]:
+    """Results, degrees and rings of the first fits that are well conditioned."""
+    from quadcurv.kernels import jet as kernel
+
+    out = np.full((wanted.size, kernel.COLUMNS), np.nan)
+    degrees, grown = np.zeros((2, wanted.size), np.int32)
+    todo = np.flatnonzero(wanted)
+    for d in range(degree, 1, -1):
+        for r in range(rings, rings + _GROWTH + 1):
+            if todo.size == 0:
+                break
+            fits = run(todo, d, r)
+            bad = fits[:, kernel.CONDITION] > _CONDITION[d]
+            if todo.size == wanted.size:
+                out = fits
+                out[bad] = np.nan
+            else:
+                out[todo[~bad]] = fits[~bad]
+            degrees[todo[~bad]], grown[todo[~bad]] = d, r
+            todo = todo[bad]
+    return out, degrees, grown
+
+
+def _unpacked(out: Floats, degree: Ints, rings: Ints, shape: tuple[int, ...], orientable: bool) -> Curvatures:
+    from quadcurv.kernels import jet as kernel
+
+    if not orientable:  # no side is the outer one: that with H >= 0
+        turn = out[:, kernel.MEAN] < 0
+        out[turn] = out[turn][:, kernel.TURNED] * kernel.SIGNS
+
+    def column(k: int) -> Floats:
+        return out[:, k].reshape(shape)
+
+    def vector(columns: slice) -> Floats:
+        return out[:, columns].reshape(*shape, 3)
+
+    return Curvatures(
+        mean=column(kernel.MEAN),
+        gaussian=column(kernel.GAUSSIAN),
+        k1=column(kernel.K1),
+        k2=column(kernel.K2),
+        direction1=vector(kernel.DIRECTION1),
+        direction2=vector(kernel.DIRECTION2),
+        normal=vector(kernel.NORMAL),
+        standard_error=StandardErrors(*(column(kernel.ERROR + k) for k in range(4))),
+        noise=column(kernel.SIGMA),
+        degree=degree.reshape(shape),
+        rings=rings.reshape(shape),
+    )
+
+
+def _on_grid(grid: QuadGrid, layers: int) -> tuple[Bools, Run]:
+    from quadcurv.kernels import jet as kernel
+
+    points, beyond = grid.points, [0, 0]
+    if 0 < layers <= _GHOST_LAYERS and _roughness(grid) < _ROUGH:
+        index, ghosts = ghost_layer(points, grid.wrap, _GHOST_DEGREE, layers)
+        points = np.concatenate((points.reshape(-1, 3), ghosts))[index]
+        beyond = [0 if wraps else layers for wraps in grid.wrap]
+
+    def run(vertices: NDArray[np.int64], degree: int, rings: int) -> Floats:
+        padded, at = points, np.stack(np.divmod(vertices, grid.shape[1]), axis=1)
+        for axis, wraps in enumerate(grid.wrap):
+            more = max(rings - beyond[axis], 0)
+            at[:, axis] += more + beyond[axis]
+            pad = [(more, more) if x == axis else (0, 0) for x in range(3)]
+            padded = np.pad(padded, pad, "wrap") if wraps else np.pad(padded, pad, constant_values=np.nan)
+        return _run(lambda v, out: kernel.grid_fits(padded, v, degree, rings, out), at.astype(np.int32))
+
+    return np.ones(grid.shape[0] * grid.shape[1], bool), run
+
+
+def _roughness(grid: QuadGrid) -> float:
+    """How far, in spacings, extrapolation misses the grid's own points at its open sides."""
+    worst, count = 0.0, _GHOST_DEGREE + 2
+    for axis, wraps in enumerate(grid.wrap):
+        if wraps:
+            continue
+        if grid.shape[axis] < count:
+            return np.inf
+        for side in (slice(None, count), slice(-count, None)):
+            line = np.moveaxis(grid.points, axis, 0)[side]
+            miss = np.linalg.norm(np.diff(line, count - 1, axis=0)[0], axis=-1)
+            spacing = np.linalg.norm(np.diff(line, axis=0), axis=-1).mean(axis=0)
+            worst = max(worst, (miss / np.maximum(spacing, np.finfo(float).tiny)).max())
+    return worst
+
+
+def _on_faces(mesh: Mesh) -> tuple[Bools, Run]:
+    from quadcurv.kernels import jet as kernel
+    from quadcurv.kernels import topology
+
+    stencils = mesh.stencils()
+    normals = stencils.ring_areas
+    indptr, corners = topology.corners_by_vertex(stencils.faces, len(stencils.points))
+    wanted = np.ones(stencils.n, bool)
+    if isinstance(mesh, QuadMesh):
+        wanted = (mesh._kind == topology.INTERIOR) | (mesh._kind == topology.BOUNDARY)
+
+    def run(vertices: NDArray[np.int64], degree: int, rings: int) -> Floats:
+        return _run(
+            lambda v, out: kernel.face_fits(
+                stencils.points, stencils.faces, indptr, corners, normals, v, degree, rings, out
+            ),
+            vertices.astype(np.int32),
+        )
+
+    return wanted, run
+
+
+def _run(fits: Callable[[Any, Floats], None], vertices: Any) -> Floats:
+    """Run a kernel over vertices, in ranges by several threads where there are many."""
+    from quadcurv.kernels import jet as kernel
+    from quadcurv.kernels import parallel
+
+    out = np.empty((len(vertices), kernel.COLUMNS))
+    parallel.over(
+        lambda start, stop: fits(vertices[start:stop], out[start:stop]),
+        len(vertices),
+        _WORK * len(vertices),
+        kernel.LANES,
+    )
+    return out

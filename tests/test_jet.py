@@ -1,0 +1,537 @@
+"""Polynomial fits: against least squares by numpy, exact curvature, and their own error bars."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import quadcurv as qc
+from quadcurv import surfaces
+from quadcurv.rates import fitted_rate
+from quadcurv.schemes import jet
+
+AXES = np.array([2.0, 1.5, 1.0])  # of the ellipsoids
+
+
+def sampled(name, n, jitter=0.0, layout="grid"):
+    """Mesh of a surface with its vertices moved along it by up to `jitter` spacings, and its exact H."""
+    surface = surfaces.SURFACES[name]()
+    rng = np.random.default_rng(n)
+    mesh, xi, eta = surface.sample((n, n), layout)
+    if layout == "grid":
+        spacing = [(b - a) / n for a, b in surface.domain]
+        xi = xi + rng.uniform(-jitter, jitter, xi.shape) * spacing[0]
+        eta = eta + rng.uniform(-jitter, jitter, eta.shape) * spacing[1]
+        return qc.QuadGrid(surface.mapping(xi, eta), surface.wrap), surface.mean_curvature(xi, eta)
+    axes = AXES if name == "cubed_ellipsoid" else np.ones(3)
+    sphere = mesh.points / axes + rng.uniform(-jitter, jitter, mesh.points.shape) * np.pi / 2 / n
+    points = axes * sphere / np.linalg.norm(sphere, axis=1, keepdims=True)
+    return mesh.with_points(points), ellipsoid_curvature(points, axes)
+
+
+def ellipsoid_curvature(points, axes):
+    support = 1 / np.linalg.norm(points / axes**2, axis=1)
+    return support**3 * (np.sum(axes**2) - np.sum(points**2, axis=1)) / (2 * np.prod(axes) ** 2)
+
+
+def inner(values, wrap, width=4):
+    return values[tuple(slice(None) if w else slice(width, -width) for w in wrap)]
+
+
+# ---- one fit, literally --------------------------------------------------------------------------------
+
+
+def literally(points, faces, v, degree, rings):
+    """H, K, k1, k2, sigma and their standard errors by lstsq and the derivatives of the formulas."""
+    around = {v}
+    for _ in range(rings):
+        around |= {i for f in faces.tolist() if around & set(f) for i in f if i >= 0}
+    at = np.array(sorted(around))
+    star = faces[(faces == v).any(axis=1)].tolist()
+    normal = np.zeros(3)
+    for f in star:
+        f = [i for i in f if i >= 0]
+        s = f.index(v)
+        normal += np.cross(points[f[(s + 1) % len(f)]] - points[v], points[f[s - 1]] - points[v])
+    n = normal / np.linalg.norm(normal)
+    t = np.linalg.svd(n[None])[2][1:]
+    x, y = (points[at] - points[v]) @ t.T.copy() @ np.eye(2)[:, 0], (points[at] - points[v]) @ t[1]
+    z = (points[at] - points[v]) @ n
+    scale = np.hypot(x, y).max()
+    exponents = [(a, b) for a in range(degree + 1) for b in range(degree + 1 - a)]
+    V = np.stack([(x / scale) ** a * (y / scale) ** b for a, b in exponents], axis=1)
+    c, *_ = np.linalg.lstsq(V, z, rcond=None)
+    residual = z - V @ c
+    sigma = np.sqrt(residual @ residual / (len(at) - len(exponents))) if len(at) > len(exponents) else np.nan
+    covariance = np.linalg.pinv(V) @ np.linalg.pinv(V).T * sigma**2
+
+    def curvatures(c):
+        d = {e: value / scale ** sum(e) for e, value in zip(exponents, c, strict=True)}
+        p, q, r, s, u = d[1, 0], d[0, 1], 2 * d[2, 0], d[1, 1], 2 * d[0, 2]
+        W = np.sqrt(1 + p * p + q * q)
+        H = -((1 + q * q) * r - 2 * p * q * s + (1 + p * p) * u) / (2 * W**3)
+        K = (r * u - s * s) / W**4
+        return np.array([H, K, H + np.sqrt(H * H - K), H - np.sqrt(H * H - K)])
+
+    gradient = np.empty((4, len(c)))
+    for k in range(len(c)):
+        step = np.zeros(len(c))
+        step[k] = 1e-6 * np.abs(c).max()
+        gradient[:, k] = (curvatures(c + step) - curvatures(c - step)) / (2 * step[k])
+    error = np.sqrt(np.einsum("ij,jk,ik->i", gradient, covariance, gradient))
+    return curvatures(c), sigma, error
+
+
+@pytest.mark.parametrize(("degree", "rings"), [(2, 1), (2, 3), (3, 2), (4, 2), (4, 3)])
+def test_fit_is_least_squares(mixed, degree, rings):
+    rng = np.random.default_rng(5)
+    mesh = mixed.with_points(mixed.points + rng.normal(0, 0.01, mixed.points.shape))
+    fits = qc.principal_curvatures(mesh, jet(degree, rings))
+    checked = 0
+    for v in range(0, len(mesh.points), 7):
+        if (fits.degree[v], fits.rings[v]) != (degree, rings):
+            continue
+        (H, K, k1, k2), sigma, error = literally(mesh.points, mesh.faces, v, degree, rings)
+        found = np.array([fits.mean[v], fits.gaussian[v], fits.k1[v], fits.k2[v]])
+        assert np.abs(found - [H, K, k1, k2]).max() < 1e-8 * max(1, np.abs(found).max())
+        if np.isfinite(sigma):
+            assert fits.noise[v] == pytest.approx(sigma, rel=1e-6)
+            # The slopes' own part, left out, is a matter of slope times extent over radius of curvature.
+            se = np.array([e[v] for e in fits.standard_error])[:2]
+            assert se == pytest.approx(error[:2], rel=0.1 if rings < 3 else 0.4)
+        checked += 1
+    assert checked >= 15
+
+
+@pytest.mark.parametrize("degree", [2, 4])
+def test_even_polynomials_are_exact_at_their_apex(degree):
+    """z = sum of even terms over points placed symmetrically: the frame is exact, and so is the fit."""
+    rng = np.random.default_rng(2)
+    i, j = np.meshgrid(np.arange(-4.0, 5), np.arange(-4.0, 5), indexing="ij")
+    xy = np.stack((i, 3 * j), axis=-1) + rng.uniform(-0.2, 0.2, (9, 9, 2))
+    xy = (xy - xy[::-1, ::-1]) / 20
+    x, y = xy[..., 0], xy[..., 1]
+    z = 0.7 * x**2 - 0.4 * x * y - 0.3 * y**2
+    if degree == 4:
+        z += 2 * x**4 - 3 * x**3 * y + x * y**3 + 4 * y**4
+    fits = qc.principal_curvatures(qc.QuadGrid(np.stack((x, y, z), axis=-1)), jet(degree))
+    assert fits.mean[4, 4] == pytest.approx(-(1.4 - 0.6) / 2, abs=1e-12)
+    assert fits.gaussian[4, 4] == pytest.approx(1.4 * -0.6 - 0.16, abs=1e-12)
+    assert np.abs(fits.normal[4, 4] - [0, 0, 1]).max() < 1e-12
+    k, directions = np.linalg.eigh([[1.4, -0.4], [-0.4, -0.6]])
+    assert (fits.k1[4, 4], fits.k2[4, 4]) == pytest.approx((-k[0], -k[1]), abs=1e-12)
+    assert abs(fits.direction1[4, 4, :2] @ directions[:, 0]) == pytest.approx(1, abs=1e-12)
+    assert abs(fits.direction2[4, 4, :2] @ directions[:, 1]) == pytest.approx(1, abs=1e-12)
+
+
+def test_curvatures_agree_with_each_other(torus):
+    fits = qc.principal_curvatures(torus)
+    assert np.abs((fits.k1 + fits.k2) / 2 - fits.mean).max() < 1e-13
+    assert np.abs(fits.k1 * fits.k2 - fits.gaussian).max() < 1e-12
+    assert (fits.k1 >= fits.k2).all()
+    frame = np.stack((fits.direction1, fits.direction2, fits.normal), axis=-2)
+    assert np.abs(frame @ np.swapaxes(frame, -1, -2) - np.eye(3)).max() < 1e-14
+    assert np.abs(np.linalg.det(frame) - 1).max() < 1e-13
+    Hn = qc.mean_curvature_normal(torus, "jet")
+    assert np.abs(Hn + fits.mean[..., None] * fits.normal).max() == 0
+    assert np.array_equal(qc.mean_curvature(torus, "jet"), fits.mean)
+    assert np.array_equal(qc.gaussian_curvature(torus), fits.gaussian)
+
+
+def test_stretched_quads_are_as_well_conditioned():
+    """Cells 1000 times as long as wide, askew: an affine map leaves the polynomials what they are."""
+    i, j = np.meshgrid(np.arange(-8, 9) / 8.0, np.arange(-8, 9) / 8.0, indexing="ij")
+    x, y = i + 0.7 * j / 1000, 0.7 * i - j / 1000
+    grid = qc.QuadGrid(np.stack((x, y, (x * x + y * y) / 200), axis=-1))
+    H = inner(qc.mean_curvature(grid, "jet"), (False, False))
+    assert np.abs(H - 0.01).max() < 1e-5  # oriented downward
+
+
+# ---- convergence ---------------------------------------------------------------------------------------
+
+SMOOTH = [
+    ("elliptic_paraboloid", "grid", (32, 64, 128), 3.7, 7e-6),
+    ("tanh_sheet", "grid", (32, 64, 128), 3.7, 2e-6),
+    ("enneper", "grid", (32, 64, 128), 3.7, 5e-6),
+    ("hyperboloid", "grid", (64, 128, 256), 3.7, 1e-6),
+    ("torus", "grid", (96, 192, 384), 3.7, 6e-6),
+    ("cubed_sphere", "faces", (16, 32, 64), 3.7, 3e-6),
+    ("cubed_ellipsoid", "faces", (16, 32, 64), 2.8, 8e-5),
+]
+
+
+@pytest.mark.parametrize(("name", "layout", "sizes", "rate", "bound"), SMOOTH)
+def test_fourth_order_on_smooth_meshes(name, layout, sizes, rate, bound):
+    """In the inf-norm, away from borders; third at valence 3, where nothing is symmetric."""
+    errors = []
+    for n in sizes:
+        mesh, exact = sampled(name, n, layout=layout)
+        wrap = mesh.wrap if layout == "grid" else (True,)
+        errors.append(inner(np.abs(qc.mean_curvature(mesh, "jet") - exact), wrap).max())
+    assert errors[-1] < bound
+    assert fitted_rate(sizes, errors) > rate
+
+
+def test_fourth_order_away_from_seams():
+    """On the cubed ellipsoid all but the corners' neighbourhoods and the seams are fourth-order."""
+    errors = []
+    for n in (16, 32, 64):
+        mesh, exact = sampled("cubed_ellipsoid", n, layout="faces")
+        sphere = np.sort(np.abs(mesh.points / AXES), axis=1)
+        inside = sphere[:, 1] / sphere[:, 2] < np.tan(np.pi / 4 * (1 - 6 / 16))  # three cells of the coarsest
+        errors.append(np.abs(qc.mean_curvature(mesh, "jet") - exact)[inside].max())
+    assert errors[-1] < 1e-5
+    assert fitted_rate((16, 32, 64), errors) > 3.7
+
+
+@pytest.mark.parametrize(
+    ("name", "layout", "sizes", "rate", "bound"),
+    [
+        ("elliptic_paraboloid", "grid", (32, 64, 128, 256), 2.8, 1.2e-5),
+        ("hyperboloid", "grid", (32, 64, 128, 256), 2.8, 4e-5),
+        ("torus", "grid", (32, 64, 128, 256), 2.8, 2e-4),
+        ("cubed_sphere", "faces", (16, 32, 64), 2.8, 4e-6),
+        ("cubed_ellipsoid", "faces", (16, 32, 64, 128), 2.8, 3e-5),
+        ("tanh_sheet", "grid", (32, 64, 128, 256), 2.6, 1.2e-5),
+        ("ellipsoid", "grid", (32, 64, 128, 256), 2.6, 2e-4),
+    ],
+)
+def test_third_order_under_jitter(name, layout, sizes, rate, bound):
+    """Vertices moved along the surface by up to 20 % of their spacing; more vertices, worse accidents."""
+    errors = []
+    for n in sizes:
+        mesh, exact = sampled(name, n, 0.2, layout)
+        wrap = mesh.wrap if layout == "grid" else (True,)
+        errors.append(inner(np.abs(qc.mean_curvature(mesh, "jet") - exact), wrap).max())
+    assert errors[-1] < bound
+    assert fitted_rate(sizes, errors) > rate
+
+
+@pytest.mark.parametrize(("degree", "rate", "bound"), [(2, 1.9, 2e-3), (3, 1.9, 6e-3)])
+def test_lower_degrees_are_second_order(degree, rate, bound):
+    errors = []
+    for n in (8, 16, 32):
+        mesh, exact = sampled("cubed_sphere", n, layout="faces")
+        errors.append(np.abs(qc.mean_curvature(mesh, jet(degree)) - exact).max())
+    assert errors[-1] < bound
+    assert fitted_rate((8, 16, 32), errors) > rate
+
+
+def test_gaussian_and_principal_curvatures_converge():
+    surface = surfaces.torus()
+    errors = []
+    for n in (64, 128, 256):
+        grid, xi, eta = surface.sample((n, n))
+        fits = qc.principal_curvatures(grid)
+        k2 = np.cos(eta) / (2 + np.cos(eta))
+        errors.append(
+            [
+                np.abs(fits.gaussian - surface.gaussian_curvature(xi, eta)).max(),
+                np.abs(fits.k1 - 1).max(),
+                np.abs(fits.k2 - k2).max(),
+            ]
+        )
+    assert np.max(errors[-1]) < 1e-4
+    for column in np.transpose(errors):
+        assert fitted_rate((64, 128, 256), column) > 3.5
+
+
+def principal_frame(points, axes):
+    """Exact k1, k2 and directions of an ellipsoid: the shape operator of its implicit equation."""
+    gradient = points / axes**2
+    size = np.linalg.norm(gradient, axis=1)
+    n = gradient / size[:, None]
+    P = np.eye(3) - n[:, :, None] * n[:, None, :]
+    shape = P @ (np.diag(1 / axes**2) @ P) / size[:, None, None]
+    # The eigenvalue 0 of the normal is moved out of the way.
+    values, vectors = np.linalg.eigh(shape - 10 * n[:, :, None] * n[:, None, :])
+    return values[:, 2], values[:, 1], vectors[:, :, 2], vectors[:, :, 1]
+
+
+@pytest.mark.parametrize("jitter", [0.0, 0.2])
+def test_principal_directions_are_second_order(jitter):
+    """Away from umbilics, seams and corners of the cubed ellipsoid included."""
+    errors = []
+    for n in (16, 32, 64):
+        mesh, _ = sampled("cubed_ellipsoid", n, jitter, "faces")
+        k1, k2, d1, d2 = principal_frame(mesh.points, AXES)
+        fits = qc.principal_curvatures(mesh)
+        apart = k1 - k2 > 0.15
+        assert apart.mean() > 0.6
+        sine = [
+            np.linalg.norm(np.cross(d, e), axis=1)[apart].max()
+            for d, e in ((fits.direction1, d1), (fits.direction2, d2))
+        ]
+        normal = mesh.points / AXES**2
+        normal /= np.linalg.norm(normal, axis=1, keepdims=True)
+        errors.append([*sine, np.linalg.norm(fits.normal - normal, axis=1).max()])
+    assert np.max(errors[-1]) < 1e-3
+    for column in np.transpose(errors):
+        assert fitted_rate((16, 32, 64), column) > 2.2
+
+
+# ---- borders -------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("name", "sizes"),
+    [
+        ("elliptic_paraboloid", (32, 64, 128)),
+        ("tanh_sheet", (32, 64, 128)),
+        ("enneper", (32, 64, 128)),
+        ("hyperboloid", (64, 128, 256)),
+        ("catenoid", (128, 256, 512)),
+    ],
+)
+def test_borders_of_smooth_grids_are_as_good_as_the_inside(name, sizes):
+    everywhere, inside = [], []
+    for n in sizes:
+        grid, exact = sampled(name, n)
+        error = np.abs(qc.mean_curvature(grid, "jet") - exact)
+        everywhere.append(error.max())
+        inside.append(inner(error, grid.wrap).max())
+    assert (np.array(everywhere) < 2 * np.array(inside)).all()
+    assert fitted_rate(sizes, everywhere) > 3.6
+
+
+@pytest.mark.parametrize("name", ["elliptic_paraboloid", "tanh_sheet", "enneper"])
+@pytest.mark.parametrize("layout", ["jittered grid", "faces"])
+def test_other_borders_are_second_order_at_least(name, layout):
+    errors = []
+    for n in (32, 64, 128):
+        grid, exact = sampled(name, n, 0.2 if layout == "jittered grid" else 0.0)
+        mesh = grid if layout == "jittered grid" else grid.to_mesh()
+        errors.append(np.abs(qc.mean_curvature(mesh, "jet") - exact.reshape(mesh.stencils().shape)).max())
+    assert errors[-1] < 2e-3
+    assert fitted_rate((32, 64, 128), errors) > 2
+
+
+def test_circular_border_of_a_disc():
+    """Quads inside a circle: an irregular border, stairs and all."""
+    errors = []
+    for n in (32, 64, 128):
+        grid, exact = sampled("elliptic_paraboloid", n)
+        mesh = grid.to_mesh()
+        kept = (np.linalg.norm(mesh.points[:, :2], axis=1) < 0.9)[mesh.faces].all(axis=1)
+        used = np.unique(mesh.faces[kept])
+        number = np.full(len(mesh.points), -1)
+        number[used] = np.arange(used.size)
+        disc = qc.QuadMesh(mesh.points[used], number[mesh.faces[kept]])
+        H = qc.mean_curvature(disc, "jet")
+        errors.append(np.abs(H - exact.ravel()[used])[np.isfinite(H)].max())
+        assert np.isfinite(H).mean() > 0.99
+    assert errors[-1] < 5e-3
+    assert fitted_rate((32, 64, 128), errors) > 2
+
+
+def test_boundary_nan_leaves_the_border_out_and_the_rest_alone():
+    grid, _ = sampled("elliptic_paraboloid", 24)
+    H = qc.mean_curvature(grid, "jet", boundary="nan")
+    assert np.isnan(H[[0, -1]]).all()
+    assert np.isnan(H[:, [0, -1]]).all()
+    assert np.isfinite(H[1:-1, 1:-1]).all()
+    whole = qc.mean_curvature(grid, "jet")
+    assert np.array_equal(H[2:-2, 2:-2], whole[2:-2, 2:-2])
+    with pytest.raises(ValueError, match="boundary: expected one of"):
+        qc.mean_curvature(grid, "jet", boundary="mirror")
+
+
+# ---- neighbourhoods that are not enough -------------------------------------------------------------------
+
+
+def test_neighbourhood_grows_before_the_degree_falls():
+    grid, _ = sampled("elliptic_paraboloid", 20)
+    fits = qc.principal_curvatures(grid.to_mesh())
+    assert (fits.degree == 4).all()
+    assert (inner(fits.rings.reshape(grid.shape), grid.wrap, 1) == 2).all()
+    assert fits.rings.reshape(grid.shape)[0].min() > 2
+
+
+def test_three_columns_cannot_hold_a_cubic():
+    x, y = np.meshgrid(np.arange(3.0), np.arange(20.0), indexing="ij")
+    z = (x - 1) ** 2 / 20 + (y - 10) ** 2 / 50
+    fits = qc.principal_curvatures(qc.QuadGrid(np.stack((x, y, z), axis=-1)))
+    assert (fits.degree == 2).all()
+    assert np.isfinite(fits.mean).all()
+    assert fits.mean[1, 10] == pytest.approx(-(1 / 10 + 1 / 25) / 2, abs=1e-3)
+
+
+def test_too_few_vertices_and_missing_ones():
+    square = [(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0.0)]
+    fits = qc.principal_curvatures((square, [(0, 1, 2, 3)]))
+    assert np.isnan(fits.mean).all()
+    assert (fits.degree == 0).all()
+    line = np.stack(np.broadcast_arrays(np.arange(8.0)[:, None], np.zeros(8), 0.0), axis=-1)
+    assert np.isnan(qc.mean_curvature(qc.QuadGrid(line), "jet")).all()  # all rows coincide
+    mesh = surfaces.cubed_sphere().sample((4, 4), "faces")[0]
+    points = np.vstack((mesh.points, (3, 3, 3)))
+    K = qc.gaussian_curvature((points, mesh.faces))
+    assert np.flatnonzero(np.isnan(K)).tolist() == [len(points) - 1]
+    assert np.abs(K[:-1] - 1).max() < 0.6
+
+
+def test_vertex_where_two_fans_touch_is_nan():
+    grid = surfaces.elliptic_paraboloid().sample((12, 12))[0].to_mesh()
+    middle = 6 * 13 + 6
+    around = np.flatnonzero((grid.faces == middle).any(axis=1))
+    kept = np.delete(grid.faces, around[[0, 3]], axis=0)
+    fans = qc.QuadMesh(grid.points, kept)
+    assert np.flatnonzero(np.isnan(qc.mean_curvature(fans, "jet"))).tolist() == [middle]
+
+
+def test_non_orientable_mesh_takes_the_side_of_positive_mean_curvature():
+    t, s = np.meshgrid(
+        np.linspace(0, 2 * np.pi, 48, endpoint=False), np.linspace(-0.4, 0.4, 9), indexing="ij"
+    )
+    radius = 1 + s * np.cos(t / 2)
+    points = np.stack((radius * np.cos(t), radius * np.sin(t), s * np.sin(t / 2)), axis=-1)
+    index = np.arange(t.size).reshape(t.shape)
+    index = np.vstack((index, index[:1, ::-1]))
+    faces = np.stack((index[:-1, :-1], index[1:, :-1], index[1:, 1:], index[:-1, 1:]), axis=-1).reshape(-1, 4)
+    with pytest.warns(UserWarning, match="non-orientable"):
+        strip = qc.QuadMesh(points.reshape(-1, 3), faces)
+    fits = qc.principal_curvatures(strip)
+    assert (fits.mean >= 0).all()
+    assert (fits.k1 >= fits.k2).all()
+    assert np.abs((fits.k1 + fits.k2) / 2 - fits.mean).max() < 1e-12
+    frame = np.stack((fits.direction1, fits.direction2, fits.normal), axis=-2)
+    assert np.abs(np.linalg.det(frame) - 1).max() < 1e-12
+    assert (fits.gaussian < 0).all()
+    # A line of symmetry: the strip through t = pi / 2 and its mirror image.
+    assert fits.mean.reshape(t.shape)[1] == pytest.approx(fits.mean.reshape(t.shape)[-1][::-1], abs=1e-6)
+
+
+def test_high_valence_pole():
+    """A vertex of valence 200, more neighbours than a fit usually has."""
+    t, s = np.meshgrid(np.linspace(0, 2 * np.pi, 200, endpoint=False), np.arange(1, 30) * 0.02, indexing="ij")
+    rings = np.stack((np.sin(s) * np.cos(t), np.sin(s) * np.sin(t), np.cos(s)), axis=-1)
+    index = 1 + np.arange(t.size).reshape(t.shape)
+    index = np.vstack((index, index[:1]))
+    quads = np.stack((index[:-1, :-1], index[:-1, 1:], index[1:, 1:], index[1:, :-1]), axis=-1).reshape(-1, 4)
+    cap = [(0, a, b) for a, b in zip(index[:-1, 0], index[1:, 0], strict=True)]
+    points = np.vstack(((0, 0, 1.0), rings.reshape(-1, 3)))
+    H = qc.mean_curvature((points, [*cap, *quads.tolist()]), "jet")
+    assert abs(H[0] - 1) < 1e-5
+    assert np.isfinite(H).all()
+
+
+# ---- noise ---------------------------------------------------------------------------------------------
+
+
+def noisy(name, n, noise, seed=7):
+    """Mesh with independent errors of `noise` spacings in every coordinate, and exact H, K, k1, k2."""
+    surface = surfaces.SURFACES[name]()
+    grid = name != "cubed_ellipsoid"
+    mesh, xi, eta = surface.sample((n, n), "grid" if grid else "faces")
+    rng = np.random.default_rng(seed)
+    x = mesh.points
+    edges = np.diff(x, axis=0) if grid else x[mesh.faces[:, 1]] - x[mesh.faces[:, 0]]
+    x = x + rng.normal(0, noise * np.median(np.linalg.norm(edges, axis=-1)), x.shape)
+    H, K = surface.mean_curvature(xi, eta), surface.gaussian_curvature(xi, eta)
+    root = np.sqrt(np.maximum(H * H - K, 0))
+    return (qc.QuadGrid(x, mesh.wrap) if grid else mesh.with_points(x)), (H, K, H + root, H - root)
+
+
+@pytest.mark.parametrize("noise", [1e-3, 1e-2, 5e-2])
+def test_error_bars_cover(noise):
+    """Two standard errors of ten residuals cover 92 %; of K, k1 and k2 while the noise is small."""
+    mesh, exact = noisy("torus", 96, noise)
+    fits = qc.principal_curvatures(mesh)
+    for value, error, true in zip(
+        (fits.mean, fits.gaussian, fits.k1, fits.k2), fits.standard_error, exact, strict=True
+    ):
+        if value is fits.mean or noise < 0.02:
+            assert 0.9 < np.mean(np.abs(value - true) < 1.96 * error) < 0.935
+    spacing = np.median(np.linalg.norm(np.diff(mesh.points, axis=0), axis=-1))
+    sigma = np.sqrt(np.mean(fits.noise**2))
+    assert sigma == pytest.approx(noise * spacing, rel=0.02)
+
+
+CHOICES = [(2, 1), *((d, r) for d in (2, 3, 4) for r in range(2, 9))]
+
+
+@pytest.mark.parametrize("noise", [0, 1e-4, 1e-3, 1e-2, 5e-2])
+@pytest.mark.parametrize(("name", "n"), [("torus", 96), ("cubed_ellipsoid", 32), ("catenoid", 64)])
+def test_auto_is_within_a_half_of_the_best_choice(name, n, noise):
+    mesh, (H, *_) = noisy(name, n, noise)
+
+    def error(scheme):
+        return np.nanmean(np.abs(qc.mean_curvature(mesh, scheme) - H))
+
+    best = min(error(jet(*choice)) for choice in CHOICES)
+    auto = error(jet("auto"))
+    assert auto < 1.5 * best
+    if noise == 0:
+        assert auto == error("jet")
+    if noise >= 1e-2:
+        assert auto < 0.3 * error("jet")
+
+
+def test_auto_on_small_meshes_is_the_standard_fit():
+    mesh, _ = sampled("cubed_sphere", 3, layout="faces")
+    assert np.array_equal(qc.mean_curvature(mesh, jet("auto")), qc.mean_curvature(mesh, "jet"))
+
+
+# ---- what is asked for wrongly --------------------------------------------------------------------------
+
+
+def test_rejections():
+    for arguments, match in (
+        ((5,), 'degree: expected "auto" or one of'),
+        (("best",), "degree: expected"),
+        ((2, 0), "rings: expected a whole number"),
+        ((2, 1.5), "rings: expected a whole number"),
+        (("auto", 2), "rings: chosen with degree"),
+    ):
+        with pytest.raises(ValueError, match=match):
+            jet(*arguments)
+    grid = surfaces.torus().sample((8, 8))[0]
+    for verb in (qc.stiffness_matrix, qc.mass_matrix, qc.dual_areas):
+        with pytest.raises(ValueError, match="jet is a fit, which has no stiffness matrix"):
+            verb(grid, "jet")
+    for verb in (qc.gaussian_curvature, qc.principal_curvatures):
+        with pytest.raises(ValueError, match="liu gives the mean curvature alone"):
+            verb(grid, "liu")
+
+
+def test_names_and_orders():
+    assert [jet(d).name for d in (2, 3, 4)] == ["jet-2", "jet-3", "jet"]
+    assert jet(2, 3).name == "jet-2-3"
+    assert [jet(d).order for d in (2, 3, 4)] == [2, 2, 4]
+
+
+def test_threads_do_not_change_a_bit():
+    mesh, _ = sampled("cubed_ellipsoid", 48, 0.2, "faces")  # 13826 vertices: two chunks
+    whole = qc.mean_curvature(mesh, "jet")
+    part = replace(jet(), name="again").curvatures(mesh, "nan").mean
+    assert np.array_equal(whole, part)
+
+
+# ---- angle defect ---------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(("name", "euler"), [("cubed_sphere", 2), ("cubed_ellipsoid", 2), ("torus", 0)])
+def test_gauss_bonnet(name, euler):
+    """Angle defects sum to 2 pi chi, to rounding, on any closed mesh."""
+    layout = "grid" if name == "torus" else "faces"
+    mesh, _ = sampled(name, 12, 0.3, layout)
+    K = qc.gaussian_curvature(mesh, "angle_defect")
+    area = qc.dual_areas(mesh, "cotan-6")
+    assert np.sum(K * area) == pytest.approx(2 * np.pi * euler, abs=1e-10)
+
+
+def test_angle_defect_converges_on_regular_grids_only():
+    surface = surfaces.torus()
+    errors = []
+    for n in (32, 64, 128):
+        grid, xi, eta = surface.sample((n, n))
+        errors.append(
+            np.abs(qc.gaussian_curvature(grid, "angle_defect") - surface.gaussian_curvature(xi, eta)).max()
+        )
+    assert errors[-1] < 2e-3
+    assert fitted_rate((32, 64, 128), errors) > 1.9
+    grid, _ = sampled("elliptic_paraboloid", 16)
+    K = qc.gaussian_curvature(grid, "angle_defect", boundary="nan")
+    assert np.isnan(K).sum() == 4 * 16

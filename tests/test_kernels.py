@@ -1,0 +1,392 @@
+"""The compiled passes give what the stencils give, whatever the grid, the threads and the caller's arrays."""
+
+from __future__ import annotations
+
+import multiprocessing
+import os
+import shutil
+import subprocess
+import sys
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import quadcurv as qc
+from quadcurv import SCHEMES, QuadGrid, QuadMesh, StaggeredGrid
+from quadcurv.kernels import diamond, parallel
+
+NAMES = ("mean_curvature", "mean_curvature_normal", "vertex_normals", "dual_areas")
+DIRECT = ("finite_volume", "liu")
+WRAPS = [(False, False), (True, False), (False, True), (True, True)]
+
+
+@pytest.fixture(autouse=True)
+def _own_threads():
+    yield
+    qc.set_threads(None)
+
+
+def rough(shape, seed=0):
+    """Points of a surface with noise of half its spacing: curvatures as large as the fluxes they sum."""
+    rng = np.random.default_rng(seed)
+    i, j = np.meshgrid(*map(np.arange, shape), indexing="ij")
+    points = np.stack([i, j, np.sin(i) + np.cos(2 * j)], axis=-1).astype(float)
+    return points + rng.uniform(-0.25, 0.25, points.shape)
+
+
+def same(mesh, scheme, boundary):
+    """Both ways agree to 1e-12 of the largest entry, NaN where NaN is."""
+    fast = qc.evaluate(mesh, *NAMES, scheme=scheme, boundary=boundary)
+    plain = qc.evaluate(mesh, *NAMES, scheme=replace(SCHEMES[scheme], write=None), boundary=boundary)
+    for name in NAMES:
+        np.testing.assert_array_equal(np.isnan(fast[name]), np.isnan(plain[name]), err_msg=name)
+        if np.isfinite(plain[name]).any():
+            scale = np.nanmax(np.abs(plain[name]))
+            np.testing.assert_allclose(fast[name], plain[name], rtol=0, atol=1e-12 * scale, err_msg=name)
+    return fast
+
+
+@pytest.mark.parametrize("boundary", ["extrapolate", "nan"])
+@pytest.mark.parametrize("wrap", WRAPS)
+@pytest.mark.parametrize("scheme", DIRECT)
+@pytest.mark.parametrize("shape", [(5, 7), (6, 5), (23, 41)])
+def test_grids(scheme, wrap, boundary, shape):
+    same(QuadGrid(rough(shape), wrap), scheme, boundary)
+
+
+@pytest.mark.parametrize("shape", [(2, 2), (2, 3), (3, 2), (4, 9)])
+@pytest.mark.parametrize("scheme", DIRECT)
+def test_small_grids_have_nothing_inside(scheme, shape):
+    H = same(QuadGrid(rough(shape)), scheme, "nan")["mean_curvature"]
+    assert np.isfinite(H).sum() == (shape[0] - 2) * (shape[1] - 2)
+
+
+@pytest.mark.parametrize("boundary", ["extrapolate", "nan"])
+@pytest.mark.parametrize("wrap", WRAPS)
+@pytest.mark.parametrize("scheme", DIRECT)
+def test_staggered_grids(scheme, wrap, boundary):
+    points = rough((17, 23))
+    primal, dual = points[1::2, 1::2], points[::2, ::2].copy()
+    for axis in (0, 1):
+        if wrap[axis]:
+            np.moveaxis(dual, axis, 0)[-1] = np.moveaxis(dual, axis, 0)[0]
+    if wrap[0]:
+        dual[-1] += 1e-12  # a seam that does not quite meet: the first side counts
+    same(StaggeredGrid(primal, dual, wrap), scheme, boundary)
+
+
+@pytest.mark.parametrize("shape", [(3, 3), (3, 7), (9, 13)])
+@pytest.mark.parametrize("boundary", ["extrapolate", "nan"])
+@pytest.mark.parametrize("scheme", DIRECT)
+def test_ghost_cells(scheme, boundary, shape):
+    points = rough([2 * s + 3 for s in shape])
+    grid = StaggeredGrid(points[::2, ::2][: shape[0] + 2, : shape[1] + 2], points[1:-1:2, 1:-1:2])
+    assert grid.has_ghosts
+    assert np.isfinite(same(grid, scheme, boundary)["mean_curvature"]).all()
+
+
+@pytest.mark.parametrize("scheme", DIRECT)
+def test_columns_beyond_the_width_done_at_once(scheme):
+    shape = (6, diamond.WIDTH + 3)
+    for wrap in WRAPS:
+        same(QuadGrid(rough(shape), wrap), scheme, "nan")
+    points = rough((2 * shape[0] + 1, 2 * shape[1] + 1))
+    same(StaggeredGrid(points[1::2, 1::2], points[::2, ::2]), scheme, "nan")
+
+
+@pytest.mark.parametrize("scheme", DIRECT)
+def test_degenerate_rings(scheme):
+    """A quad without area, a fold that closes on itself and a ring without vector area."""
+    points = rough((12, 14))
+    points[4, 4] = points[5, 5] = points[4, 5] = points[5, 4]
+    points[2, 10:13] = points[2, 10]
+    for boundary in ("extrapolate", "nan"):
+        H = same(QuadGrid(points), scheme, boundary)["mean_curvature"]
+        assert np.isnan(H[4:6, 4:6]).all()
+        assert np.isfinite(H[6, 1:-1]).any()
+        same(QuadGrid(points).to_mesh(), scheme, boundary)
+    points[8, 9] = points[10, 9]  # sums of corners round to an area instead
+    assert np.isnan(qc.mean_curvature(QuadGrid(points), scheme)[9, 9])
+
+
+def sheet(shape, n_triangles=0, hole=False, seed=0):
+    """Quads of a grid, some cut into triangles, some left out, vertices and faces in random order."""
+    rng = np.random.default_rng(seed)
+    mesh = QuadGrid(rough(shape, seed)).to_mesh()
+    faces = mesh.faces[rng.permutation(len(mesh.faces))].tolist()
+    if hole:
+        faces = faces[8:]
+    cut, kept = faces[:n_triangles], faces[n_triangles:]
+    faces = [*kept, *((a, b, c) for a, b, c, _ in cut), *((c, d, a) for a, _, c, d in cut)]
+    order = rng.permutation(len(mesh.points))
+    return mesh.points[np.argsort(order)], [[order[v] for v in face] for face in faces]
+
+
+@pytest.mark.parametrize("boundary", ["extrapolate", "nan"])
+@pytest.mark.parametrize("kind", [{}, {"hole": True}, {"n_triangles": 20}, {"n_triangles": 11 * 13}])
+@pytest.mark.parametrize("scheme", DIRECT)
+def test_face_lists(scheme, kind, boundary):
+    points, faces = sheet((12, 14), **kind)
+    mesh = QuadMesh(points, faces)
+    first = same(mesh, scheme, boundary)
+    again = qc.evaluate(mesh.with_points(points), *NAMES, scheme=scheme, boundary=boundary)
+    for name in NAMES:
+        np.testing.assert_array_equal(again[name], first[name])
+    moved = mesh.with_points(1 + 2 * points[:, [1, 2, 0]])
+    np.testing.assert_array_equal(
+        qc.mean_curvature(moved, scheme, boundary), qc.mean_curvature((moved.points, faces), scheme, boundary)
+    )
+
+
+@pytest.mark.parametrize("scheme", DIRECT)
+def test_extraordinary_isolated_and_non_orientable(scheme):
+    cube = np.array([(x, y, z) for x in (0, 1) for y in (0, 1) for z in (0, 1)], float)
+    faces = [[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]]
+    assert np.isfinite(same(QuadMesh(cube, faces), scheme, "extrapolate")["mean_curvature"]).all()
+    with_isolated = QuadMesh(np.vstack((cube, [9, 9, 9])), faces)
+    assert np.isnan(same(with_isolated, scheme, "extrapolate")["mean_curvature"][-1])
+    n, m = 24, 9
+    t, s = np.meshgrid(2 * np.pi * np.arange(n) / n, np.linspace(-0.4, 0.4, m), indexing="ij")
+    strip = np.stack(
+        [(1 + s * np.cos(t / 2)) * np.cos(t), (1 + s * np.cos(t / 2)) * np.sin(t), s * np.sin(t / 2)], -1
+    )
+    index = np.arange(n * m).reshape(n, m)
+    index = np.vstack((index, index[:1, ::-1]))
+    quads = np.stack((index[:-1, :-1], index[1:, :-1], index[1:, 1:], index[:-1, 1:]), -1).reshape(-1, 4)
+    with pytest.warns(UserWarning, match="non-orientable"):
+        moebius = QuadMesh(strip.reshape(-1, 3), quads)
+    H = qc.mean_curvature(moebius, scheme, "nan")
+    plain = qc.mean_curvature(moebius, replace(SCHEMES[scheme], write=None), "nan")
+    np.testing.assert_allclose(H, plain, rtol=0, atol=1e-12 * np.nanmax(plain))
+    assert np.nanmin(H) >= 0
+
+
+@pytest.mark.parametrize("threads", [1, 2, 3, 7])
+@pytest.mark.parametrize("scheme", DIRECT)
+def test_results_are_bitwise_the_same_for_any_number_of_threads(scheme, threads, monkeypatch):
+    grid = QuadGrid(rough((301, 257)))
+    mesh = QuadMesh(*sheet((60, 70)))
+    points = rough((401, 131))
+    cells = StaggeredGrid(points[1::2, 1::2], points[::2, ::2])
+    meshes = (grid, mesh, cells)
+    before = [qc.evaluate(m, *NAMES, scheme=scheme) for m in meshes]
+    monkeypatch.setattr(parallel, "SERIAL_BELOW", 0)
+    monkeypatch.setattr(diamond, "LEAST_ROWS", 1)
+    qc.set_threads(threads)
+    for one, many in zip(before, (qc.evaluate(m, *NAMES, scheme=scheme) for m in meshes), strict=True):
+        for name in NAMES:
+            np.testing.assert_array_equal(one[name], many[name])
+
+
+@pytest.mark.parametrize("wanted", [NAMES[:1], NAMES[1:2], NAMES[2:], NAMES[::2]])
+@pytest.mark.parametrize("scheme", DIRECT)
+def test_any_subset_in_one_pass_into_given_arrays(scheme, wanted):
+    grid = QuadGrid(rough((30, 20)))
+    everything = qc.evaluate(grid, *NAMES, scheme=scheme)
+    out = {name: np.empty_like(everything[name]) for name in wanted}
+    some = qc.evaluate(grid, scheme=scheme, out=out)
+    assert some.keys() == set(wanted)
+    for name in wanted:
+        assert some[name] is out[name]
+        np.testing.assert_array_equal(some[name], everything[name])
+
+
+def test_rejected_arguments():
+    grid = QuadGrid(rough((6, 6)))
+    with pytest.raises(ValueError, match=r"wanted: expected some of mean_curvature, .* got 'torsion'"):
+        qc.evaluate(grid, "torsion")
+    for bad in (np.empty((6, 5)), np.empty((6, 6), np.float32), np.empty((6, 12))[:, ::2]):
+        with pytest.raises(ValueError, match=r"out: mean_curvature wants a writeable .* \(6, 6\)"):
+            qc.evaluate(grid, out={"mean_curvature": bad})
+    with pytest.raises(ValueError, match="number: expected at least 1 thread, got 0"):
+        qc.set_threads(0)
+    with pytest.raises(ValueError, match=r"scheme: .* is a fit"):
+        qc.evaluate(grid, "mean_curvature", scheme="jet")
+
+
+def test_neither_points_nor_order_nor_type_are_the_callers_problem():
+    points = rough((20, 30))
+    H = qc.mean_curvature(QuadGrid(points))
+    for given in (np.asfortranarray(points), np.repeat(points, 2, axis=1)[:, ::2], points.tolist()):
+        np.testing.assert_array_equal(qc.mean_curvature(QuadGrid(given)), H)
+
+
+def test_far_neighbours_are_brought_together(monkeypatch):
+    points, faces = sheet((40, 50))
+    mesh = QuadMesh(points, faces)
+    first = qc.evaluate(mesh, *NAMES)
+    monkeypatch.setattr("quadcurv.mesh._FAR", 0)
+    again = mesh.with_points(points)
+    second = qc.evaluate(again, *NAMES)
+    order, ring = again.ring_order()
+    assert sorted(order) == list(range(len(points)))
+    regular = ring[:, 0] >= 0
+    assert np.median(np.abs(ring[regular] - np.flatnonzero(regular)[:, None])) < 100
+    for name in NAMES:
+        np.testing.assert_array_equal(first[name], second[name])
+
+
+def large_and_serial():
+    """Sum of H of a grid large enough for threads, and of the same with one."""
+    grid = QuadGrid(rough((600, 500)))
+    qc.set_threads(2)
+    two = qc.mean_curvature(grid)
+    qc.set_threads(1)
+    return bool(np.array_equal(two, qc.mean_curvature(grid)))
+
+
+@pytest.mark.filterwarnings("ignore:.*use of fork:DeprecationWarning")
+def test_after_a_fork_and_from_other_threads():
+    assert large_and_serial()  # the pool exists before the fork
+    with multiprocessing.get_context("fork").Pool(2) as pool:
+        assert pool.apply_async(large_and_serial).get(60)
+    grid = QuadGrid(rough((600, 500)))
+    qc.set_threads(3)
+    H = qc.mean_curvature(grid)
+    with ThreadPoolExecutor(4) as callers:
+        for other in callers.map(lambda _: qc.mean_curvature(grid), range(8)):
+            np.testing.assert_array_equal(other, H)
+
+
+def test_number_of_threads_from_the_environment(monkeypatch):
+    monkeypatch.setenv("QUADCURV_NUM_THREADS", "3")
+    assert parallel.threads() == 3
+    qc.set_threads(2)
+    assert parallel.threads() == 2
+    qc.set_threads(None)
+    monkeypatch.setenv("QUADCURV_NUM_THREADS", "many")
+    assert 1 <= parallel.threads() <= (os.cpu_count() or 1)
+
+
+def test_without_a_thread_to_be_had_the_caller_computes(monkeypatch):
+    def refuse(*_):
+        raise RuntimeError("can't start new thread")
+
+    monkeypatch.setattr(parallel, "SERIAL_BELOW", 0)
+    monkeypatch.setattr(ThreadPoolExecutor, "submit", refuse)
+    done = []
+    qc.set_threads(2)
+    parallel.over(lambda start, stop: done.append((start, stop)), 10, 10)
+    assert done == [(0, 10)]
+
+
+CUBE = "numpy.array([(x, y, z) for x in (0, 1) for y in (0, 1) for z in (0, 1)], float)"
+PROGRAM = f"""
+import numpy
+import quadcurv
+cube = {CUBE}
+faces = [[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]]
+print(quadcurv.mean_curvature((cube, faces)).max())
+"""
+
+
+def run(folder, **environment):
+    """What PROGRAM prints with the package in this folder."""
+    env = {**os.environ, "PYTHONPATH": str(folder), "PYTHONDONTWRITEBYTECODE": "1", **environment}
+    done = subprocess.run(
+        [sys.executable, "-c", PROGRAM], env=env, cwd=folder, capture_output=True, text=True, check=True
+    )
+    return float(done.stdout)
+
+
+@pytest.fixture
+def copy(tmp_path):
+    """A copy of the package, without compiled files."""
+    package = Path(qc.__file__).parent
+    shutil.copytree(package, tmp_path / "quadcurv", ignore=shutil.ignore_patterns("__pycache__"))
+    return tmp_path
+
+
+@pytest.mark.slow
+def test_compiled_code_is_not_stale_after_an_edit(copy):
+    before = run(copy)
+    assert run(copy) == before
+    cached = copy / "quadcurv" / "kernels" / "__pycache__"
+    assert list(cached.glob("diamond.quads*.nbi"))
+    source = copy / "quadcurv" / "kernels" / "diamond.py"
+    # A helper of the compiled entry points: the flux doubled.
+    text = source.read_text()
+    assert "scale = 0.5 / length" in text
+    source.write_text(text.replace("scale = 0.5 / length", "scale = 1.0 / length"))
+    assert run(copy) == pytest.approx(2 * before, rel=1e-14)
+
+
+@pytest.mark.slow
+def test_nothing_needs_to_be_writeable(copy):
+    before = run(copy)
+    for compiled in (copy / "quadcurv").rglob("__pycache__"):
+        shutil.rmtree(compiled)
+        compiled.write_text("a file, so that no folder can be made here")
+    nowhere = str(copy / "file")
+    Path(nowhere).write_text("")
+    assert run(copy, HOME=nowhere, XDG_CACHE_HOME=nowhere, NUMBA_CACHE_DIR="") == before
+
+
+def general(stencils, scheme):
+    """Stiffness summed entry by entry, as scipy does."""
+    local = SCHEMES[scheme].stiffness.keywords["general"]
+    return local(stencils)[: stencils.n]
+
+
+@pytest.mark.parametrize("scheme", DIRECT)
+def test_stiffness_straight_into_csr(scheme):
+    points = rough((17, 23))
+    meshes = [
+        QuadGrid(rough((12, 14))),
+        QuadGrid(rough((12, 14)), (True, True)),
+        StaggeredGrid(points[1::2, 1::2], points[::2, ::2]),
+        *(QuadMesh(*sheet((12, 14), **kind)) for kind in ({}, {"hole": True}, {"n_triangles": 20})),
+    ]
+    for mesh in meshes:
+        S = qc.stiffness_matrix(mesh, scheme)
+        expected = general(mesh.stencils(), scheme)
+        assert S.shape == expected.shape
+        assert abs(S - expected).max() < 1e-12 * abs(expected).max()
+        S.check_format(full_check=True)
+        assert S.has_canonical_format
+        assert S.nnz <= expected.nnz
+
+
+@pytest.mark.parametrize("scheme", DIRECT)
+def test_stiffness_is_refreshed_in_place(scheme, monkeypatch):
+    points, faces = sheet((60, 50), n_triangles=30, hole=True)
+    mesh = QuadMesh(points, faces)
+    S = qc.stiffness_matrix(mesh, scheme)
+    arrays = S.indptr, S.indices, S.data
+    moved = mesh.with_points(points + 0.1 * np.sin(points[:, ::-1]))
+    fresh = qc.stiffness_matrix(moved, scheme)
+    assert abs(S - fresh).max() > 0.01
+    monkeypatch.setattr(parallel, "SERIAL_BELOW", 0)
+    qc.set_threads(3)
+    assert qc.stiffness_matrix(moved, scheme, out=S) is S
+    for one, other, expected in zip(
+        arrays, (S.indptr, S.indices, S.data), (fresh.indptr, fresh.indices, fresh.data), strict=True
+    ):
+        assert one is other
+        np.testing.assert_array_equal(one, expected)
+    with pytest.raises(ValueError, match="out: expected a stiffness matrix of the same mesh"):
+        qc.stiffness_matrix(QuadMesh(*sheet((12, 14))), scheme, out=S)
+    with pytest.raises(ValueError, match="out: cotan-6 assembles a new matrix each time"):
+        qc.stiffness_matrix(mesh, "cotan-6", out=S)
+
+
+def test_a_ring_with_a_vertex_twice_is_not_regular():
+    """A torus so thin and twisted that the two vertices diagonally across are one."""
+
+    def vertex(i, j):
+        return 5 * (i % 2) + (j - 2 * (i // 2)) % 5
+
+    quads = [
+        [vertex(i, j), vertex(i + 1, j), vertex(i + 1, j + 1), vertex(i, j + 1)]
+        for i in range(2)
+        for j in range(5)
+    ]
+    mesh = QuadMesh(rough((2, 5)).reshape(-1, 3), quads)
+    assert (mesh.ring_order()[1][:, 0] < 0).all()
+    same(mesh, "finite_volume", "nan")
+    S = qc.stiffness_matrix(mesh)
+    assert S.has_canonical_format
+    assert abs(S - general(mesh.stencils(), "finite_volume")).max() < 1e-13 * abs(S).max()
