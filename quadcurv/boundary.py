@@ -5,21 +5,28 @@ from __future__ import annotations
 from math import comb
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy import sparse
 
 from quadcurv.mesh import (
+    Bools,
     Floats,
+    Frame,
     Mesh,
     MeshError,
     QuadGrid,
     QuadMesh,
     StaggeredGrid,
     Stencils,
+    face_pairs,
     grid_faces,
 )
 
+Indices = NDArray[np.int64]
+
 BOUNDARIES = ("extrapolate", "nan")
+OPEN, INTERIOR, EXTRAPOLATED = 0, 1, 2
+DEGREE = 4
 
 
 def stencils(mesh: Mesh, boundary: str = "extrapolate") -> Stencils:
@@ -29,10 +36,9 @@ def stencils(mesh: Mesh, boundary: str = "extrapolate") -> Stencils:
     ----------
     mesh : QuadMesh, QuadGrid or StaggeredGrid
     boundary : {"extrapolate", "nan"}
-        "extrapolate" closes the rings at open sides of a grid by one layer of ghost points,
+        "extrapolate" closes rings at the boundary by one layer of ghost points,
         X_-1 = 5 X_0 - 10 X_1 + 10 X_2 - 5 X_3 + X_4, which keeps second order up to the border with the
-        interior's own error. "nan" leaves them open: their curvature is NaN. The boundary of a face list
-        stays open in either case.
+        interior's own error. "nan" leaves them open: their curvature is NaN.
 
     Returns
     -------
@@ -41,12 +47,33 @@ def stencils(mesh: Mesh, boundary: str = "extrapolate") -> Stencils:
     Raises
     ------
     MeshError
-        A ValueError: an open direction has fewer than the 5 points that the extrapolation reads.
+        A ValueError: an open direction of a grid has fewer than the 5 points that the extrapolation
+        reads. (The same side of a face list stays open.)
+    ValueError
+        Unknown boundary.
+
+    Notes
+    -----
+    Of a face list, the strip of quads inward from each boundary edge is continued by one ghost quad. Its two
+    sides run X_0, ..., X_4 straight through X_1, X_2, X_3, which must be regular: four quads around, or
+    two on the boundary. At a corner, a boundary vertex of one quad, the two ghost layers are
+    extrapolated once more to the point across. A face list of a grid thus gets the ghosts of the grid.
+    A boundary vertex is closed if it has one or two faces and all ghost quads around it exist.
+
+    Nothing is known, and the curvature by every stiffness and dual area is NaN, at other boundary
+    vertices: of three or more faces (also at a re-entrant corner), of several fans, of a triangle, and where
+    a strip beside them is too short or meets a triangle or an extraordinary vertex within four quads.
+    :func:`boundary_treatment` tells which is which. Fits need no ghosts there: they look to one side.
+
+    The extrapolation trusts the strips to be smooth: an error of one position reaches a ghost up to 10
+    times as large, that across a corner up to 100 times. :func:`roughness` tells what to expect of it.
     """
     if boundary not in BOUNDARIES:
         raise ValueError(f"boundary: expected one of {BOUNDARIES}, got {boundary!r}")
-    if boundary == "nan" or isinstance(mesh, QuadMesh):
+    if boundary == "nan":
         return mesh.stencils()
+    if isinstance(mesh, QuadMesh):
+        return ghosted_faces(mesh.stencils())
     if isinstance(mesh, QuadGrid):
         return _ghosted_grid(mesh)
     if mesh.has_ghosts:
@@ -54,7 +81,62 @@ def stencils(mesh: Mesh, boundary: str = "extrapolate") -> Stencils:
     return _ghosted_cells(mesh)
 
 
-def ghost_layer(points: Floats, wrap: tuple[bool, bool], degree: int = 4) -> tuple[NDArray[np.int32], Floats]:
+def boundary_treatment(mesh: Mesh, boundary: str = "extrapolate") -> NDArray[np.uint8]:
+    """What closes the ring of every vertex.
+
+    Parameters
+    ----------
+    mesh, boundary
+        As for :func:`stencils`.
+
+    Returns
+    -------
+    (n,) or (r, c) uint8
+        ``INTERIOR`` (1): faces of the mesh, or ghost cells that it came with. ``EXTRAPOLATED`` (2): ghost
+        quads. ``OPEN`` (0): nothing, and the curvature is NaN; isolated vertices too.
+
+    Raises
+    ------
+    ValueError
+        As for :func:`stencils`.
+    """
+    given, treated = mesh.stencils().closed, stencils(mesh, boundary)
+    treatment = np.where(given, INTERIOR, np.where(treated.closed, EXTRAPOLATED, OPEN))
+    return treatment.astype(np.uint8).reshape(treated.shape)
+
+
+def roughness(mesh: Mesh) -> Floats:
+    """How rough the lines are that extrapolation continues: about the relative error it makes.
+
+    Parameters
+    ----------
+    mesh : QuadMesh, QuadGrid or StaggeredGrid
+
+    Returns
+    -------
+    (n,) or (r, c) float64
+        Length of the last difference X_0 - 4 X_1 + 6 X_2 - 4 X_3 + X_4 over that of X_1 - X_0, the
+        largest of all ghosts around the vertex; 0 inside, NaN in an open ring. On a smooth mesh it falls
+        with the third power of the edges. Where points are uneven instead, the error of the mean
+        curvature is once or twice this part of the larger principal curvature (up to six times at the
+        corners of a grid), and beyond one half nothing can be said.
+
+    Raises
+    ------
+    MeshError
+        As for :func:`stencils`.
+    """
+    if isinstance(mesh, StaggeredGrid):
+        if mesh.has_ghosts:
+            return np.zeros(mesh.shape)
+        mesh = QuadGrid(mesh.primal, mesh.wrap)
+    ghosted, rough = _ghosted_faces(mesh.stencils())
+    return rough.reshape(ghosted.shape)
+
+
+def ghost_layer(
+    points: Floats, wrap: tuple[bool, bool], degree: int = DEGREE, layers: int = 1
+) -> tuple[NDArray[np.int32], Floats]:
     """Surround a grid of points by ghosts where it is open.
 
     Parameters
@@ -64,10 +146,14 @@ def ghost_layer(points: Floats, wrap: tuple[bool, bool], degree: int = 4) -> tup
         Directions that wrap, hence have no open side.
     degree : int
         Degree of the polynomial through the degree + 1 points next to an open side.
+    layers : int
+        How many ghosts X_-1, X_-2, ... beyond an open side, all on the same polynomial. Second-order
+        schemes that read one ring want one layer of degree 4, fourth-order ones that read two rings
+        two layers of degree 5.
 
     Returns
     -------
-    index : (r or r + 2, c or c + 2) int32
+    index : (r or r + 2 layers, c or c + 2 layers) int32
         Indices of the grid with its ghosts: the points row by row, then the ghosts from r c on.
     ghosts : (g, 3) float64
 
@@ -77,31 +163,89 @@ def ghost_layer(points: Floats, wrap: tuple[bool, bool], degree: int = 4) -> tup
         A ValueError: fewer than degree + 1 points in an open direction.
     """
     shape = points.shape[:2]
-    for size, wraps, name in zip(shape, wrap, ("rows", "columns"), strict=True):
-        if not wraps and size <= degree:
-            raise MeshError(
-                f"points: {size} {name}, but extrapolation beyond an open side needs at least "
-                f'{degree + 1}; boundary="nan" needs none'
-            )
+    _require(shape, wrap, degree)
     number = np.arange(shape[0] * shape[1], dtype=np.int32).reshape(shape)
-    index = np.pad(number, [(int(not w),) * 2 for w in wrap], constant_values=-1)
+    index = np.pad(number, [(0 if w else layers,) * 2 for w in wrap], constant_values=-1)
     is_ghost = index < 0
     index[is_ghost] = np.arange(number.size, number.size + np.count_nonzero(is_ghost))
-    extend = sparse.kron(*(_extension(s, w, degree) for s, w in zip(shape, wrap, strict=True)), format="csr")
+    along, across = (_extension(s, w, degree, layers) for s, w in zip(shape, wrap, strict=True))
+    extend = scipy.sparse.kron(along, across, format="csr")
     # Relative to one of the points, so that an offset of the whole surface costs no digits.
     origin = points[0, 0]
     ghosts = extend[np.flatnonzero(is_ghost)] @ (points - origin).reshape(-1, 3) + origin
     return index, ghosts
 
 
-def _extension(size: int, wraps: bool, degree: int) -> sparse.csr_array:
-    """Identity, between two rows of extrapolation where the direction is open."""
-    identity = sparse.eye_array(size, format="csr")
+def frame(grid: QuadGrid | StaggeredGrid, boundary: str = "extrapolate") -> Frame:
+    """What :func:`stencils` puts around a grid, as rows and columns; NaN where nothing is known.
+
+    Parameters
+    ----------
+    grid : QuadGrid or StaggeredGrid
+        The ghost cells of a grid that has them are not copied: NaN stands for them.
+    boundary
+        As for :func:`stencils`.
+
+    Returns
+    -------
+    Frame
+
+    Raises
+    ------
+    ValueError
+        As for :func:`stencils`.
+    """
+    if boundary not in BOUNDARIES:
+        raise ValueError(f"boundary: expected one of {BOUNDARIES}, got {boundary!r}")
+    points = grid.points if isinstance(grid, QuadGrid) else grid.primal
+    if isinstance(grid, StaggeredGrid) and grid.has_ghosts:
+        points, boundary = points[1:-1, 1:-1], "nan"
+    if boundary == "extrapolate":
+        _require(points.shape[:2], grid.wrap, DEGREE)
+
+    def ends(x: Floats, wraps: bool) -> Floats:
+        """Rows before the first and after the last one."""
+        if wraps:
+            return np.stack((x[-1], x[0]))
+        if boundary == "nan":
+            return np.full((2, *x[0].shape), np.nan)
+        near = np.stack((x[: DEGREE + 1], x[: -DEGREE - 2 : -1]), axis=1)
+        return near[0] + np.tensordot(_weights(DEGREE), near - near[0], 1)  # an offset costs no digits
+
+    beyond = ends(points, grid.wrap[0])
+    c = points.shape[1]
+    ends_of_rows = [k for k in range(c) if min(k, c - 1 - k) <= DEGREE]
+    sides = np.concatenate([x[:, ends_of_rows] for x in (beyond[:1], points, beyond[1:])])
+    beside = ends(sides.swapaxes(0, 1), grid.wrap[1]).swapaxes(0, 1)
+    return Frame(beyond.reshape(2, -1), np.ascontiguousarray(beside))
+
+
+def _require(shape: tuple[int, ...], wrap: tuple[bool, bool], degree: int) -> None:
+    for size, wraps, name in zip(shape, wrap, ("rows", "columns"), strict=True):
+        if not wraps and size <= degree:
+            raise MeshError(
+                f"points: {size} {name}, but extrapolation beyond an open side needs at least "
+                f'{degree + 1}; boundary="nan" needs none'
+            )
+
+
+def _weights(degree: int, layer: int = 1) -> Floats:
+    """Lagrange polynomials of the nodes 0, ..., degree at -layer."""
+    return np.array(
+        [(-1.0) ** k * comb(degree + layer, degree - k) * comb(layer + k - 1, k) for k in range(degree + 1)]
+    )
+
+
+def _extension(size: int, wraps: bool, degree: int, layers: int) -> scipy.sparse.csr_array:
+    """Identity, between rows of extrapolation where the direction is open."""
+    identity = scipy.sparse.eye_array(size, format="csr")
     if wraps:
         return identity
-    row = np.zeros((1, size))
-    row[0, : degree + 1] = [(-1) ** k * comb(degree + 1, k + 1) for k in range(degree + 1)]
-    return sparse.vstack((sparse.csr_array(row), identity, sparse.csr_array(row[:, ::-1])), format="csr")
+    rows = np.zeros((layers, size))
+    for layer in range(1, layers + 1):
+        rows[-layer, : degree + 1] = _weights(degree, layer)
+    before, after = scipy.sparse.csr_array(rows), scipy.sparse.csr_array(rows[::-1, ::-1])
+    return scipy.sparse.vstack((before, identity, after), format="csr")
 
 
 def _ghosted_grid(grid: QuadGrid) -> Stencils:
@@ -116,3 +260,121 @@ def _ghosted_cells(grid: StaggeredGrid) -> Stencils:
     index, ghosts = ghost_layer(grid.primal, grid.wrap)
     index = np.pad(index, [(int(w),) * 2 for w in grid.wrap], mode="wrap")
     return grid.diamonds(index, ghosts)
+
+
+def ghosted_faces(mesh: Stencils) -> Stencils:
+    """Stencils of a face list with its ghost quads, see :func:`stencils`."""
+    return _ghosted_faces(mesh)[0]
+
+
+def _ghosted_faces(mesh: Stencils) -> tuple[Stencils, Floats]:
+    """Stencils with a ghost quad beyond every boundary edge whose strip is long enough; roughness (n,)."""
+    n, points = mesh.n, mesh.points
+    rails, slot, valence, n_edges = _strips(mesh)
+    if len(rails) == 0:
+        return mesh, np.where(mesh.closed, 0.0, np.nan)
+    # One ghost for each rail X_0, X_1, ...: at a side the strips to the left and right share it.
+    _, first, ghost = np.unique(rails[:, 0] * n + rails[:, 1], return_index=True, return_inverse=True)
+    ghosts, rough = _extrapolated(points[rails[first]])
+    quads = np.concatenate((n + ghost.reshape(-1, 2), rails[:, 0].reshape(-1, 2)[:, ::-1]), axis=1)
+
+    both = np.bincount(rails[:, 0], minlength=n) == 2
+    side = both & (valence == 2) & (n_edges == 2)
+    corner = both & (valence == 1)
+    # At a corner one strip begins and another ends: the rail of each runs along the edges of the other.
+    at = np.flatnonzero(corner[rails[:, 0]])
+    at = at[np.lexsort((at % 2, rails[at, 0]))]
+    beyond, known = _beside(rails, ghost, rails[at], n)
+    known = known[::2] & known[1::2]
+    beyond, (begin, end) = beyond[np.repeat(known, 2)], at.reshape(-1, 2)[known].T
+    across, rough_across = _extrapolated(ghosts[beyond])
+    c = rails[begin, 0]
+    number = n + len(ghosts) + np.arange(c.size)
+    corner_quads = np.stack((number, n + ghost[begin], c, n + ghost[end]), axis=1)
+    quads = np.concatenate((quads, corner_quads), dtype=np.int32)
+
+    closed = mesh.closed | side
+    closed[c] = True
+    rough = np.concatenate((np.zeros(n), rough, np.maximum(rough_across[::2], rough_across[1::2])))
+    worst = np.zeros(rough.size)
+    np.maximum.at(worst, quads, rough[quads].max(axis=1, keepdims=True))
+    roughness = np.where(closed & np.isfinite(worst[:n]), worst[:n], np.nan)
+
+    # Each begins where its face does, moved outward: a fixed diagonal goes on in the ghosts.
+    first_slot = np.concatenate((slot, slot[begin // 2]))
+    quads = np.take_along_axis(quads, (np.arange(4) - first_slot[:, None]) % 4, axis=1)
+    return Stencils(
+        np.concatenate((points, ghosts, (across[::2] + across[1::2]) / 2)),
+        np.concatenate((mesh.faces, quads)),
+        mesh.shape,
+        closed,
+        mesh.orientable,
+    ), roughness
+
+
+def _extrapolated(lines: Floats) -> tuple[Floats, Floats]:
+    """X_-1 of lines X_0, X_1, ... (k, DEGREE + 1, 3), and their last difference over their first edge."""
+    x = lines - lines[:, :1]  # an offset costs no digits
+    difference = np.linalg.norm(np.diff(x, DEGREE, axis=1)[:, 0], axis=1)
+    edge = np.linalg.norm(x[:, 1], axis=1)
+    rough = np.divide(difference, edge, out=np.full(edge.shape, np.inf), where=edge > 0)
+    return lines[:, 0] + np.einsum("k,lkx->lx", _weights(DEGREE), x), rough
+
+
+def _beside(rails: Indices, ghost: Indices, lines: Indices, n: int) -> tuple[Indices, Bools]:
+    """Ghosts of the vertices along `lines`, as the strips between them have them, and whether all exist."""
+    key = rails[:, 0] * n + rails[:, 0].reshape(-1, 2)[:, ::-1].ravel()
+    order = np.argsort(key)
+    wanted = lines * n + lines[:, [1, *range(DEGREE)]]
+    place = order[np.minimum(np.searchsorted(key, wanted, sorter=order), key.size - 1)]
+    return ghost[place], (key[place] == wanted).all(axis=1)
+
+
+def _strips(mesh: Stencils) -> tuple[Indices, Indices, Indices, Indices]:
+    """Strips of quads inward from boundary edges, straight through regular vertices.
+
+    Returns
+    -------
+    rails : (2 k, DEGREE + 1) int64
+        The two sides of each strip; its first face runs from the first one to the second.
+    slot : (k,) int64
+        Where the boundary edge begins in that face.
+    valence, n_edges : (n,) int64
+        Number of faces and of boundary edges at each vertex.
+    """
+    from quadcurv.kernels import topology
+
+    faces, n = mesh.faces, mesh.n
+    border = np.flatnonzero(~mesh.closed[faces].all(axis=1))
+    sides = np.where(faces[border, 3] < 0, 3, 4)
+    outer = np.arange(4) < sides[:, None]
+    f, i, g, j = face_pairs(faces[border])
+    outer[f, i] = outer[g, j] = False
+    near, i = np.nonzero(outer)
+    f, j = border[near], (i + 1) % sides[near]
+    # An edge with an end inside is none: its other face is not among those at the border.
+    kept = ~mesh.closed[faces[f, i]] & ~mesh.closed[faces[f, j]]
+    n_edges = np.bincount(np.concatenate((faces[f, i][kept], faces[f, j][kept])), minlength=n)
+
+    indptr, corners = topology.corners_by_vertex(faces, n)
+    valence = np.diff(indptr)
+    regular = valence == np.where(mesh.closed, 4, 2)
+    regular[faces[faces[:, 3] < 0, :3]] = False
+    kept &= faces[f, 3] >= 0
+    f, i, j = f[kept], i[kept], j[kept]
+    slot = i
+    strips = np.empty((f.size, 2, DEGREE + 1), np.int64)
+    strips[:, 0, 0], strips[:, 1, 0] = faces[f, i], faces[f, j]
+    for k in range(1, DEGREE + 1):
+        i, j = (2 * i - j) % 4, (2 * j - i) % 4  # across the quad, where the edge begins and ends
+        u, v = faces[f, i], faces[f, j]
+        strips[:, 0, k], strips[:, 1, k] = u, v
+        if k == DEGREE:
+            break
+        around = corners[np.minimum(indptr[u, None] + np.arange(4), indptr[u + 1, None] - 1)] // 4
+        beyond = (faces[around] == v[:, None, None]).any(axis=2) & (around != f[:, None])
+        kept = regular[u] & regular[v] & beyond.any(axis=1)
+        strips, slot, u, v = strips[kept], slot[kept], u[kept], v[kept]
+        f = around[kept, beyond[kept].argmax(axis=1)]
+        i, j = (faces[f] == u[:, None]).argmax(axis=1), (faces[f] == v[:, None]).argmax(axis=1)
+    return strips.reshape(-1, DEGREE + 1), slot, valence, n_edges

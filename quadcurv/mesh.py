@@ -10,16 +10,34 @@ from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
+import scipy
 from numpy.typing import ArrayLike, NDArray
-from scipy import sparse
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int32]
 Bools = NDArray[np.bool_]
 
+_LARGEST = 1e70
+_FAR = 100_000  # vertices between neighbours in memory, on average, from which on reordering pays
+
 
 class MeshError(ValueError):
     """What is wrong with a mesh: which argument, where first (face or vertex), and how often."""
+
+
+class Recovery(NamedTuple):
+    """How the quads of a mesh were found among triangles.
+
+    Attributes
+    ----------
+    rule : {"given", "carrier", "ply", "block", "interleaved", "diagonal", "shape", "none"}
+        See :meth:`QuadMesh.from_trimesh` and :func:`quadcurv.pair_triangles` ("shape").
+    paired : float
+        Fraction of the triangles that went into quads.
+    """
+
+    rule: str
+    paired: float
 
 
 class CornerTable(NamedTuple):
@@ -46,6 +64,21 @@ class CornerTable(NamedTuple):
     next: Ints
     diagonal: Ints
     previous: Ints
+
+
+class Frame(NamedTuple):
+    """What surrounds a grid of points: ghosts, or the other side where it wraps.
+
+    Attributes
+    ----------
+    beyond : (2, 3 c) float64
+        The rows before the first and after the last one.
+    beside : (r + 2, 2, 3) float64
+        The points before the first and after the last column, from the row before the first one on.
+    """
+
+    beyond: Floats
+    beside: Floats
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,6 +122,13 @@ class Stencils:
         return count[: self.n].astype(np.int32)
 
     @cached_property
+    def ring(self) -> Ints:
+        """(p, 8) int32: (a, d, a, d, ...) around each regular vertex inside, first -1 for all others."""
+        from quadcurv.kernels import topology
+
+        return topology.rings(self.faces, *topology.corners_by_vertex(self.faces, len(self.points)))
+
+    @cached_property
     def ring_areas(self) -> Floats:
         """(n, 3) float64: half the vector area of each ring polygon; it points along the normal."""
         from quadcurv.kernels import diamond
@@ -96,12 +136,15 @@ class Stencils:
         if self.orientable:
             normal = np.zeros_like(self.points)
             diamond.ring_normals(self.points, self.faces, normal)
-            return normal[: self.n]
-        # Faces disagree somewhere: the corner table has each ring turned one way.
-        indptr, c, a, _, b = self.corner_table
-        corner = np.cross(self.points[a] - self.points[c], self.points[b] - self.points[c])
-        sums = sparse.csr_array((np.full(c.size, 0.25), np.arange(c.size), indptr), (self.n, c.size))
-        return sums @ corner
+            normal = normal[: self.n]
+        else:  # faces disagree somewhere: the corner table has each ring turned one way
+            indptr, c, a, _, b = self.corner_table
+            corner = np.cross(self.points[a] - self.points[c], self.points[b] - self.points[c])
+            sums = scipy.sparse.csr_array((np.full(c.size, 0.25), np.arange(c.size), indptr))
+            normal = sums @ corner
+        # A length that is lost to underflow gives no direction.
+        normal[np.einsum("ix,ix->i", normal, normal) < np.finfo(float).tiny] = 0
+        return normal
 
     @cached_property
     def corner_table(self) -> CornerTable:
@@ -109,7 +152,7 @@ class Stencils:
         from quadcurv.kernels import topology
 
         indptr, corners = topology.corners_by_vertex(self.faces, len(self.points))
-        _, flipped, *_ = topology.order_rings(self.faces, indptr, corners)
+        _, flipped, *_ = topology.order_rings(self.faces, indptr, corners, np.arange(self.n))
         indptr = indptr[: self.n + 1]
         face, slot = np.divmod(corners[: indptr[-1]], 4)
         quad = self.faces[face, 3] >= 0
@@ -155,12 +198,15 @@ class QuadMesh:
         How many faces were turned so that neighbours agree.
     orientable : bool
         False for a mesh such as a Moebius strip; its mean curvature is given without sign.
+    recovery : Recovery or None
+        How the quads were found, where they come from triangles.
 
     Raises
     ------
     MeshError
-        A ValueError: wrong shapes, non-finite points, indices out of range or repeated in a face,
-        edges with more than two faces.
+        A ValueError: wrong shapes or types, masked entries, non-finite points, coordinates beyond 1e70 or
+        all within 1e-70 of each other, indices out of range or repeated in a face, edges with more than
+        two faces.
 
     Warns
     -----
@@ -174,15 +220,16 @@ class QuadMesh:
 
     points: Floats
     faces: Ints
-    face_source: NDArray[np.int64]
     n_split: int
     n_flipped: int
     orientable: bool
+    recovery: Recovery | None = None
 
     def __init__(self, points: ArrayLike, faces: ArrayLike | Sequence[Sequence[int]]) -> None:
         self.points = _checked_points(points, "points", ("n", 3))
-        self.faces, self.face_source, self.n_split = _checked_faces(faces, self.points)
+        self.faces, self._source, self.n_split = _checked_faces(faces, self.points)
         self.n_flipped, self.orientable = 0, True
+        self._shared: dict[str, Any] = {}
         self._orient()
         self.faces.flags.writeable = False
 
@@ -191,12 +238,20 @@ class QuadMesh:
         kinds = f"{len(self.faces) - triangles} quads" + (f", {triangles} triangles" if triangles else "")
         return f"QuadMesh({len(self.points)} points, {kinds})"
 
+    @property
+    def face_source(self) -> NDArray[np.int64]:
+        """(m,) int64: the index of the given face that each of `faces` stems from."""
+        return np.arange(len(self.faces)) if self._source is None else self._source
+
     def _orient(self) -> None:
         """Reject non-manifold edges; turn faces until neighbours agree, or find that they cannot."""
         from quadcurv.kernels import topology
 
         indptr, corners = topology.corners_by_vertex(self.faces, len(self.points))
-        kind, _, bad_edge, n_disagree = topology.order_rings(self.faces, indptr, corners)
+        ring = topology.rings(self.faces, indptr, corners)
+        # Where four quads run the same way round there is nothing to reject or to turn.
+        others = np.flatnonzero(ring[:, 0] < 0)
+        kind, _, bad_edge, n_disagree = topology.order_rings(self.faces, indptr, corners, others)
         if bad_edge[2]:
             raise MeshError(
                 f"faces: {bad_edge[2]} edge(s) with more than two faces, "
@@ -209,20 +264,166 @@ class QuadMesh:
             self.faces[turn & quad] = self.faces[turn & quad][:, [0, 3, 2, 1]]
             self.faces[turn & ~quad] = self.faces[turn & ~quad][:, [0, 2, 1, 3]]
             corners = topology.corners_by_vertex(self.faces, len(self.points))[1]
-            kind, *_ = topology.order_rings(self.faces, indptr, corners)
+            ring = topology.rings(self.faces, indptr, corners)
+            others = np.flatnonzero(ring[:, 0] < 0)
+            kind, *_ = topology.order_rings(self.faces, indptr, corners, others)
             if not self.orientable:
                 warnings.warn(
                     "the mesh is non-orientable: its mean curvature has no sign, |H| is given",
                     stacklevel=3,
                 )
-        self._kind = kind
+        self._kind, self._ring, self._others = kind, ring, others
 
     def stencils(self) -> Stencils:
         """One-ring stencils of the vertices as they are; rings at a boundary stay open."""
         from quadcurv.kernels import topology
 
         closed = self._kind == topology.INTERIOR
-        return Stencils(self.points, self.faces, (len(self.points),), closed, self.orientable)
+        stencils = Stencils(self.points, self.faces, (len(self.points),), closed, self.orientable)
+        stencils.__dict__["ring"] = self._ring
+        return stencils
+
+    @staticmethod
+    def from_trimesh(mesh: Any, quads: ArrayLike | None = None) -> QuadMesh:
+        """Make a mesh of a trimesh.Trimesh, its quads put together again where its data says how.
+
+        trimesh knows triangles only. The first rule that fits is used, and named in `recovery`:
+
+        - "given": `quads`;
+        - "carrier": what :meth:`to_trimesh` left; it survives reordering and removing of faces;
+        - "ply": polygons of the PLY file the Trimesh was loaded from, if the triangles are still those;
+        - "block", "interleaved": the two orders in which trimesh cuts quads (a, b, c, d) into (a, b, c) and
+          (c, d, a). Every pair is checked to share that diagonal. At least half of the triangles must pair:
+          a mesh of genuine triangles has few such pairs, and they are left alone;
+        - "diagonal": the same pairs in any order, if nine in ten triangles pair;
+        - "none": genuine triangles, as far as one can know; :func:`quadcurv.pair_triangles` pairs them by
+          their shape, on request only.
+
+        ``QuadMesh(mesh.vertices, mesh.faces)`` keeps the triangles whatever their order says.
+
+        Parameters
+        ----------
+        mesh : trimesh.Trimesh or trimesh.Scene
+            A Scene of one Trimesh is taken where it stands.
+        quads : (m, 4) array_like of int or sequence of polygons, optional
+            The faces over the vertices of `mesh`, where the caller knows them.
+
+        Returns
+        -------
+        QuadMesh
+            Over all vertices of `mesh`, in their order.
+
+        Raises
+        ------
+        MeshError
+            A ValueError: no mesh, or a Scene of several.
+        TypeError
+            Another type.
+        """
+        from quadcurv import interop
+
+        return interop.from_trimesh(mesh, quads)
+
+    def to_trimesh(self) -> Any:
+        """Return a trimesh.Trimesh; its triangles are the quads (a, b, c, d) cut as (a, b, c), (c, d, a).
+
+        Triangles come first, then the first halves, then the second ones, as trimesh cuts quads itself.
+        The face attribute "quadcurv" says what they were cut from, for :meth:`from_trimesh`.
+        """
+        from quadcurv import interop
+
+        return interop.to_trimesh(self)
+
+    @staticmethod
+    def from_pyvista(dataset: Any) -> QuadMesh:
+        """Make a mesh of a pyvista.PolyData, or of an UnstructuredGrid of polygons.
+
+        Triangles stay triangles: pyvista keeps quads by itself. Lines and vertex cells of a PolyData are
+        not read. A StructuredGrid is a :class:`QuadGrid`.
+
+        Raises
+        ------
+        MeshError
+            A ValueError: triangle strips, volume cells (with the first), no faces.
+        TypeError
+            Another type.
+        """
+        from quadcurv import interop
+
+        return interop.from_pyvista(dataset)
+
+    def to_pyvista(self) -> Any:
+        """Return a pyvista.PolyData with the same points, in double precision, and faces."""
+        from quadcurv import interop
+
+        return interop.to_pyvista(self)
+
+    @staticmethod
+    def from_pymeshlab(mesh: Any) -> QuadMesh:
+        """Make a mesh of a pymeshlab.Mesh, or of the current mesh of a MeshSet, where it stands.
+
+        MeshLab keeps a quad as two triangles and a hidden diagonal: quads and polygons come back, but the
+        vertex that a face begins with may be another.
+
+        Raises
+        ------
+        MeshError
+            A ValueError: an empty MeshSet, deleted elements, no faces.
+        TypeError
+            Another type.
+        """
+        from quadcurv import interop
+
+        return interop.from_pymeshlab(mesh)
+
+    def to_pymeshlab(self) -> Any:
+        """Return a pymeshlab.MeshSet with this mesh in it, in double precision.
+
+        The set, since a pymeshlab.Mesh taken out of it does not outlive it.
+
+        Raises
+        ------
+        ImportError
+            pymeshlab, of the extra ``quadcurv[meshlab]``, is not installed.
+        """
+        from quadcurv import interop
+
+        return interop.to_pymeshlab(self)
+
+    def ring_order(self) -> tuple[Ints | None, Ints]:
+        """Rings (n, 8) of the regular vertices inside, first -1 for all others; and an order of them.
+
+        The order is None for that of the vertices; else rings are in it, numbered by it. It pays on large
+        meshes whose neighbours are far apart in memory, and takes the time of several evaluations: it
+        is made the second time that a connectivity is used.
+        """
+        from quadcurv.kernels import topology
+
+        shared = self._shared
+        if "order" not in shared and shared.setdefault("uses", 0) > 0:
+            order = None
+            if topology.mean_distance(self._ring) > _FAR:
+                order = topology.nearby_order(self._ring)
+                shared["ring"] = topology.renumbered(self._ring, order)
+            shared["order"] = order
+        shared["uses"] = 1
+        return shared.get("order"), shared.get("ring", self._ring)
+
+    def others(self) -> tuple[NDArray[np.int64], Stencils]:
+        """Vertices that are not regular or not inside, and the stencils of a part of the mesh around them.
+
+        The first vertices of the part are these; it reaches four faces beyond them, so that they have there
+        all that a ghost layer or a scheme may look at.
+        """
+        from quadcurv.kernels import topology
+
+        if self._others.size == 0:
+            return self._others, Stencils(self.points[:0], self.faces[:0], (0,), np.empty(0, bool))
+        if "part" not in self._shared:
+            self._shared["part"] = topology.part_around(self.faces, self._others, len(self.points), 4)
+        vertices, faces = self._shared["part"]
+        closed = self._kind[vertices] == topology.INTERIOR
+        return self._others, Stencils(self.points[vertices], faces, (vertices.size,), closed, self.orientable)
 
     def with_points(self, points: ArrayLike) -> QuadMesh:
         """Return the same faces, not checked again, over other positions of the same shape."""
@@ -278,6 +479,50 @@ class QuadGrid:
             closed[:, [0, -1]] = False
         return Stencils(self.points.reshape(-1, 3), grid_faces(index), self.shape, closed.ravel())
 
+    @staticmethod
+    def from_pyvista(dataset: Any, wrap: Sequence[bool] = (False, False)) -> QuadGrid:
+        """Make a grid of a pyvista.StructuredGrid of one layer.
+
+        Parameters
+        ----------
+        dataset : pyvista.StructuredGrid
+            Of dimensions (r, c, 1), (r, 1, c) or (1, r, c).
+        wrap : (bool, bool)
+            Directions that are closed: the last row (column), which repeats the first, is dropped.
+
+        Returns
+        -------
+        QuadGrid
+            points[i, j] is VTK's point i + r j.
+
+        Raises
+        ------
+        MeshError
+            A ValueError: a volume, or a seam that does not meet.
+        TypeError
+            Another type.
+
+        Warns
+        -----
+        UserWarning
+            The first and the last row (column) coincide although `wrap` says nothing of it.
+        """
+        from quadcurv import interop
+
+        return interop.from_structured(dataset, wrap)
+
+    def to_pyvista(self) -> Any:
+        """Return a pyvista.StructuredGrid, (r, c, 1), wraps closed by repeating the first row or column."""
+        from quadcurv import interop
+
+        return interop.to_structured(self)
+
+    def side(self, axis: int, end: int) -> QuadGrid:
+        """Return the two rows (axis 0) or columns (1) at the first (end 0) or last (-1) open side."""
+        size = self.shape[axis]
+        kept = range(2) if end == 0 else range(size - 2, size)
+        return QuadGrid(self.points.take(kept, axis), [w and i != axis for i, w in enumerate(self.wrap)])
+
     def to_mesh(self) -> QuadMesh:
         """Return the same quads as a face list, vertices in row-major order."""
         stencils = self.stencils()
@@ -318,6 +563,8 @@ class StaggeredGrid:
             )
         if self.primal.shape[:2] == (r + 2, c + 2) and any(self.wrap):
             raise MeshError("wrap: primal has ghost cells already, so no side is left to wrap")
+        if self.primal.shape[:2] == (1, 1):
+            raise MeshError("primal: a single cell needs ghost cells around it")
         self.shape = r, c
         for axis, name in enumerate(("rows", "columns")):
             if not self.wrap[axis]:
@@ -330,6 +577,14 @@ class StaggeredGrid:
 
     def __repr__(self) -> str:
         return f"StaggeredGrid({self.shape[0]} x {self.shape[1]} cells, wrap={self.wrap})"
+
+    def side(self, axis: int, end: int) -> StaggeredGrid:
+        """Return the two rows (axis 0) or columns (1) at the first (end 0) or last (-1) open side."""
+        size = self.shape[axis]
+        kept = range(min(2, size)) if end == 0 else range(max(0, size - 2), size)
+        corners = range(kept.start, kept.stop + 1)
+        wrap = [w and i != axis for i, w in enumerate(self.wrap)]
+        return StaggeredGrid(self.primal.take(kept, axis), self.dual.take(corners, axis), wrap)
 
     @property
     def has_ghosts(self) -> bool:
@@ -443,42 +698,67 @@ def _first_and_count(bad: Any) -> tuple[int, int]:
 
 def _checked_points(points: ArrayLike, name: str, shape: tuple[Any, ...]) -> Floats:
     """Read-only C-contiguous float64; a number in `shape` is required, a letter is free."""
-    given = np.asarray(points)
+    try:
+        given = np.asarray(points)
+    except (ValueError, OverflowError):  # rows of different lengths, integers beyond all floats
+        given = np.empty(0, object)
+    if np.ma.is_masked(points):
+        raise MeshError(f"{name}: masked entries, expected a number in each")
     if given.dtype.kind not in "fiu":
         raise MeshError(f"{name}: expected real numbers, got dtype {given.dtype}")
     if given.ndim != len(shape) or any(
         isinstance(want, int) and have != want for have, want in zip(given.shape, shape, strict=True)
     ):
         raise MeshError(f"{name}: shape {given.shape}, expected ({', '.join(map(str, shape))})")
-    array = np.ascontiguousarray(given, dtype=np.float64).view()
+    with np.errstate(over="ignore"):  # of long doubles; they are found below
+        array = np.ascontiguousarray(given, dtype=np.float64).view()
     array.flags.writeable = False
-    if not np.isfinite(array).all():
+    with np.errstate(invalid="ignore"):
+        extremes = (array.min(), array.max()) if array.size else (0.0, 0.0)
+    if not np.isfinite(extremes).all():  # both are NaN if any entry is
         first, count = _first_and_count(~np.isfinite(array.reshape(-1, 3)).all(axis=1))
         where = np.unravel_index(first, array.shape[:-1])
         at = first if array.ndim == 2 else tuple(map(int, where))
         raise MeshError(f"{name}: {count} non-finite point(s), first vertex {at}: {array[where]}")
+    if array.size:
+        rows = array.reshape(-1, 3)
+        # The square of an area, hence the fourth power of a length, must neither overflow nor vanish.
+        if np.abs(extremes).max() > _LARGEST:
+            first, count = _first_and_count((np.abs(rows) > _LARGEST).any(axis=1))
+            raise MeshError(
+                f"{name}: {count} point(s) beyond {_LARGEST:g}, whose areas overflow, first vertex {first}"
+            )
+        if np.ptp(rows[:: len(rows) // 8 + 1], axis=0).max() < 1 / _LARGEST and (
+            0 < np.ptp(rows, axis=0).max() < 1 / _LARGEST
+        ):
+            raise MeshError(f"{name}: all within {1 / _LARGEST:g} of each other, where areas vanish")
     return array
 
 
 def _checked_wrap(wrap: Sequence[bool]) -> tuple[bool, bool]:
-    if isinstance(wrap, str) or not np.iterable(wrap) or len(list(wrap)) != 2:
+    given = list(wrap) if np.iterable(wrap) else []
+    if len(given) != 2 or not all(isinstance(w, bool | np.bool_) for w in given):
         raise MeshError(f"wrap: expected two booleans, got {wrap!r}")
-    first, second = wrap
-    if not all(isinstance(w, bool | np.bool_) for w in (first, second)):
-        raise MeshError(f"wrap: expected two booleans, got {wrap!r}")
-    return bool(first), bool(second)
+    return bool(given[0]), bool(given[1])
 
 
-def _checked_faces(faces: Any, points: Floats) -> tuple[Ints, NDArray[np.int64], int]:
-    """Faces as (m, 4) int32, the given face each stems from, and how many were split."""
+def _checked_faces(faces: Any, points: Floats) -> tuple[Ints, NDArray[np.int64] | None, int]:
+    """Faces as (m, 4) int32, the given face each stems from unless it is the same, and how many were split."""
+    from quadcurv.kernels import topology
+
+    if len(points) == 0:
+        raise MeshError("points: none given")
     try:
         given = np.asarray(faces)
     except ValueError:  # polygons of different lengths
         given = np.empty(0, object)
+    if np.ma.is_masked(faces):
+        raise MeshError("faces: masked entries, expected an index in each")
     if given.ndim == 2 and given.shape[1] in (3, 4) and given.dtype.kind in "iu":
-        table = np.full((len(given), 4), -1, np.int64)
-        table[:, : given.shape[1]] = given
-        source, n_split = np.arange(len(given)), 0
+        if given.dtype == np.uint64:  # the largest must not come out as -1
+            given = np.minimum(given, np.uint64(np.iinfo(np.int64).max))
+        table = np.ascontiguousarray(given, np.int32 if given.dtype == np.int32 else np.int64).view()
+        source, n_split = range(len(given)), 0
     elif given.ndim == 2 and given.shape[1] in (3, 4):
         raise MeshError(f"faces: expected integer indices, got dtype {given.dtype}")
     else:
@@ -488,24 +768,24 @@ def _checked_faces(faces: Any, points: Floats) -> tuple[Ints, NDArray[np.int64],
     n = len(points)
     if n > np.iinfo(np.int32).max // 4:
         raise MeshError(f"points: {n} are more than 32-bit indices can number")
-    padding = np.zeros(table.shape, bool)
-    padding[:, 3] = table[:, 3] == -1
-    bad = ((table < 0) & ~padding) | (table >= n)
-    if bad.any():
-        face, count = _first_and_count(bad.any(axis=1))
+    table.flags.writeable = False  # of one type for the compiler, whatever the caller's is
+    checked = np.empty((len(table), 4), np.int32)
+    (outside, n_outside), (repeated, n_repeated) = topology.checked(table, n, checked)
+    if n_outside:
         raise MeshError(
-            f"faces: {count} face(s) with an index outside 0..{n - 1}, "
-            f"first face {source[face]}: {table[face].tolist()}"
+            f"faces: {n_outside} face(s) with an index outside 0..{n - 1}, "
+            f"first face {source[outside]}: {_padded(table[outside])}"
         )
-    ordered = np.sort(table, axis=1)
-    repeated = (ordered[:, 1:] == ordered[:, :-1]).any(axis=1)
-    if repeated.any():
-        face, count = _first_and_count(repeated)
+    if n_repeated:
         raise MeshError(
-            f"faces: {count} face(s) with a repeated vertex, first face {source[face]}: "
-            f"{table[face].tolist()}"
+            f"faces: {n_repeated} face(s) with a repeated vertex, first face {source[repeated]}: "
+            f"{_padded(table[repeated])}"
         )
-    return table.astype(np.int32), source, n_split
+    return checked, source if n_split else None, n_split
+
+
+def _padded(face: Any) -> list[int]:
+    return [*face.tolist(), -1][:4]
 
 
 def _from_polygons(faces: Any, points: Floats) -> tuple[NDArray[np.int64], NDArray[np.int64], int]:
@@ -524,10 +804,10 @@ def _from_polygons(faces: Any, points: Floats) -> tuple[NDArray[np.int64], NDArr
     for i, polygon in enumerate(polygons):
         if len(polygon) < 3:
             raise MeshError(f"faces: a face has at least 3 vertices, face {i} has {len(polygon)}")
+        if min(polygon) < (-1 if len(polygon) == 4 else 0) or max(polygon) >= len(points):
+            raise MeshError(f"faces: face {i} has an index outside 0..{len(points) - 1}: {polygon}")
         pieces = [polygon]
         if len(polygon) > 4:
-            if min(polygon) < 0 or max(polygon) >= len(points):
-                raise MeshError(f"faces: face {i} has an index outside 0..{len(points) - 1}: {polygon}")
             if len(set(polygon)) < len(polygon):
                 raise MeshError(f"faces: face {i} has a repeated vertex: {polygon}")
             corners = points[polygon] - points[polygon[0]]
@@ -560,8 +840,8 @@ def _consistent_sides(faces: Ints) -> tuple[Bools, bool]:
     # Node f is face f as given, node f + m the same face turned; an edge joins what goes together.
     rows = np.concatenate((f, f + m))
     columns = np.concatenate((np.where(same_way, g + m, g), np.where(same_way, g, g + m)))
-    graph = sparse.coo_array((np.ones(rows.size, bool), (rows, columns)), shape=(2 * m, 2 * m))
-    label = sparse.csgraph.connected_components(graph, directed=False)[1]
+    graph = scipy.sparse.coo_array((np.ones(rows.size, bool), (rows, columns)), shape=(2 * m, 2 * m))
+    label = scipy.sparse.csgraph.connected_components(graph, directed=False)[1]
     orientable = not bool((label[:m] == label[m:]).any())
     kept = np.bincount(label[:m], minlength=label.max() + 1)
     turned = np.bincount(label[m:], minlength=label.max() + 1)

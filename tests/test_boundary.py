@@ -1,0 +1,358 @@
+"""Ghosts beyond the boundary: exactness, order, and which vertices get none."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from quadcurv import (
+    SCHEMES,
+    MeshError,
+    QuadGrid,
+    QuadMesh,
+    Scheme,
+    mean_curvature,
+    stencils,
+    surfaces,
+    vertex_normals,
+)
+from quadcurv.boundary import EXTRAPOLATED, INTERIOR, OPEN, boundary_treatment, ghost_layer
+from quadcurv.rates import fitted_rate
+
+every_laplacian = pytest.mark.parametrize(
+    "scheme", [name for name, scheme in SCHEMES.items() if isinstance(scheme, Scheme)]
+)
+
+
+def grid_quads(index):
+    quads = np.stack((index[:-1, :-1], index[1:, :-1], index[1:, 1:], index[:-1, 1:]), axis=-1)
+    return quads.reshape(-1, 4)
+
+
+def square(n):
+    """A square of 2 n x 2 n cells: parameters (p, 2) and quads."""
+    t = np.linspace(-1, 1, 2 * n + 1)
+    uv = np.stack(np.meshgrid(t, t, indexing="ij"), axis=-1).reshape(-1, 2)
+    return uv, grid_quads(np.arange(t.size**2).reshape(t.size, t.size))
+
+
+def without_unused(points, faces):
+    used, faces = np.unique(faces, return_inverse=True)
+    return points[used], faces.reshape(-1, 4)
+
+
+def l_shape(n):
+    """The square without a quarter: one re-entrant corner, at the origin."""
+    uv, quads = square(n)
+    return without_unused(uv, quads[~(uv[quads].mean(axis=1) > 0).all(axis=1)])
+
+
+def annulus(n):
+    """Cells around a closed direction eta in [0, 2 pi), open in xi."""
+    xi, eta = np.linspace(-1, 1, 2 * n + 1), np.arange(4 * n) * np.pi / (2 * n)
+    index = np.arange(xi.size * eta.size).reshape(xi.size, eta.size)
+    uv = np.stack(np.meshgrid(xi, eta, indexing="ij"), axis=-1).reshape(-1, 2)
+    return uv, grid_quads(np.pad(index, [(0, 0), (0, 1)], mode="wrap"))
+
+
+def disc(valence):
+    """Sectors of n x n quads around one vertex, bent by z^(4 / valence): smooth but at that vertex."""
+
+    def cells(n):
+        t = np.linspace(0, 1, n + 1)
+        z = t[:, None] + 1j * t
+        z = (np.abs(z) * np.exp(1j * np.angle(z))) ** (4 / valence)
+        sectors = np.concatenate([(z * np.exp(2j * np.pi * k / valence)).ravel() for k in range(valence)])
+        xy = np.stack((sectors.real, sectors.imag), axis=1)
+        _, first, welded = np.unique(np.round(xy, 9) + 0.0, axis=0, return_index=True, return_inverse=True)
+        index = np.arange(sectors.size).reshape(valence, n + 1, n + 1)
+        return xy[first], welded.ravel()[np.concatenate([grid_quads(i) for i in index])]
+
+    return cells
+
+
+def shuffled(points, faces, rng, turn_starts=True):
+    """The same quads, vertices and faces in another order, each beginning at another corner."""
+    order = rng.permutation(len(points))
+    faces = np.argsort(order)[rng.permutation(faces)]
+    if turn_starts:
+        start = rng.integers(0, 4, len(faces))
+        faces = np.take_along_axis(faces, (np.arange(4) + start[:, None]) % 4, axis=1)
+    return points[order], faces, order
+
+
+# ---- face lists of grids ------------------------------------------------------------------------------
+
+GRIDS = {
+    "5 x 5": (surfaces.elliptic_paraboloid, (5, 5)),
+    "5 x 9": (surfaces.hyperbolic_paraboloid, (5, 9)),
+    "12 x 7": (surfaces.tanh_sheet, (12, 7)),
+    "catenoid": (surfaces.catenoid, (6, 11)),
+    "narrow tube": (surfaces.cylinder, (3, 5)),
+    "torus": (surfaces.torus, (6, 7)),
+}
+
+
+@every_laplacian
+@pytest.mark.parametrize("name", GRIDS)
+def test_a_grid_as_a_shuffled_face_list_has_the_ghosts_of_the_grid(name, scheme, rng):
+    surface, cells = GRIDS[name]
+    surface = surface()
+    axes = [
+        np.linspace(a, b, k, endpoint=not wraps)
+        for (a, b), k, wraps in zip(surface.domain, cells, surface.wrap, strict=True)
+    ]
+    grid = QuadGrid(surface.mapping(axes[0][:, None], axes[1]), surface.wrap)
+    mesh = grid.to_mesh()
+    # One fixed diagonal per quad goes from its first vertex: there, faces must begin where they did.
+    points, faces, order = shuffled(mesh.points, mesh.faces, rng, not scheme.startswith("cotan-6"))
+    mesh = QuadMesh(points, faces)
+    H = mean_curvature(grid, scheme).ravel()[order]
+    assert np.isfinite(H).all()
+    assert np.abs(mean_curvature(mesh, scheme) - H).max() < 1e-12 * max(np.abs(H).max(), 1)
+    assert np.array_equal(boundary_treatment(mesh), boundary_treatment(grid).ravel()[order])
+    assert len(stencils(mesh).points) == len(stencils(grid).points)
+
+
+def quartic(i, j):
+    """A surface whose coordinates are quartic in each index: extrapolation continues it exactly."""
+    x, y = i / 8 - 0.7, j / 8 - 0.6
+    return np.stack((x + 0.1 * y**2, y - 0.1 * x**2 * y, 0.5 * x**2 + y**2 * x**2 - 0.3 * y**4 * x), axis=-1)
+
+
+@given(st.data())
+@settings(max_examples=60, derandomize=True, deadline=None)
+def test_ghosts_of_any_part_of_a_grid_continue_it(data):
+    """On a part of a quartic grid every vertex has the curvature that it has inside the whole, or NaN."""
+    size = 14
+    kept = np.zeros((size, size), bool)
+    for _ in range(data.draw(st.integers(1, 4))):
+        low = data.draw(st.tuples(st.integers(0, 9), st.integers(0, 9)))
+        high = data.draw(st.tuples(st.integers(low[0] + 1, size), st.integers(low[1] + 1, size)))
+        kept[low[0] : high[0], low[1] : high[1]] ^= True
+    if not kept.any():
+        return
+    i, j = np.mgrid[0 : size + 1, 0 : size + 1]
+    faces = grid_quads((size + 1) * i + j)[kept.ravel()]
+    mesh = QuadMesh(quartic(i, j).reshape(-1, 3), faces)
+    i, j = np.mgrid[-1 : size + 2, -1 : size + 2]
+    whole = QuadGrid(quartic(i, j))
+    treated, closed = boundary_treatment(mesh), stencils(mesh).closed
+    for scheme in ("finite_volume", "liu", "cotan-4", "cotan-6"):
+        expected = mean_curvature(whole, scheme, boundary="nan")[1:-1, 1:-1].ravel()
+        H = mean_curvature(mesh, scheme)
+        assert np.array_equal(np.isfinite(H), closed)
+        assert np.abs(H - expected)[closed].max(initial=0) < 1e-9
+    # Ghosts make a mesh of their own; its closed rings are the ones that are said to be closed.
+    ghosted = stencils(mesh)
+    if len(ghosted.points) > len(mesh.points):
+        again = QuadMesh(ghosted.points, ghosted.faces)
+        assert again.n_flipped == 0
+        assert np.array_equal(again.stencils().closed[: ghosted.n], closed)
+    assert np.array_equal(treated == INTERIOR, mesh.stencils().closed)
+
+
+@pytest.mark.parametrize("scheme", ["finite_volume", "liu", "cotan-4"])
+def test_a_moebius_strip_has_the_ghosts_of_its_double_cover(scheme):
+    r, c = 20, 6
+    u, v = np.arange(2 * r)[:, None] * 2 * np.pi / r, np.linspace(-0.4, 0.4, c)
+    R = 2 + v * np.cos(u / 2)
+    points = np.stack((R * np.cos(u), R * np.sin(u), v * np.sin(u / 2)), axis=-1)
+    index = np.arange(r * c).reshape(r, c)
+    faces = grid_quads(np.vstack((index, index[:1, ::-1])))
+    with pytest.warns(UserWarning, match="non-orientable"):
+        strip = QuadMesh(points[:r].reshape(-1, 3), faces)
+    H = np.abs(mean_curvature(QuadGrid(points, (True, False)), scheme))[:r].ravel()
+    assert np.abs(mean_curvature(strip, scheme) - H).max() < 1e-12
+    assert np.count_nonzero(boundary_treatment(strip) == EXTRAPOLATED) == 2 * r
+
+
+# ---- order --------------------------------------------------------------------------------------------
+
+# On the discs the cotan formula is of first order where diagonals of two sectors meet, inside as well.
+ORDER = [
+    # surface, cells, bounds of the error on the boundary at the finest of 12, 24 and 48 cells
+    ("elliptic_paraboloid", square, {"finite_volume": 1.7e-5, "liu": 3.5e-5, "cotan-6": 4e-5}),
+    ("hyperbolic_paraboloid", square, {"finite_volume": 6e-5, "liu": 8e-5, "cotan-6": 8e-5}),
+    ("catenoid", annulus, {"finite_volume": 1e-4, "liu": 1e-4, "cotan-6": 1e-4}),
+    ("elliptic_paraboloid", l_shape, {"finite_volume": 9e-4, "liu": 1.8e-3, "cotan-6": 1.8e-3}),
+    ("hyperbolic_paraboloid", l_shape, {"finite_volume": 2e-4, "liu": 2.8e-4, "cotan-6": 2.8e-4}),
+    ("elliptic_paraboloid", disc(3), {"finite_volume": 5e-5, "liu": 1.4e-4}),
+    ("elliptic_paraboloid", disc(5), {"finite_volume": 5e-5, "liu": 3.5e-5}),
+    ("hyperbolic_paraboloid", disc(3), {"finite_volume": 1.1e-4, "liu": 1.5e-4}),
+]
+
+
+@pytest.mark.parametrize(
+    ("name", "cells", "scheme", "bound"),
+    [(name, cells, scheme, bound) for name, cells, bounds in ORDER for scheme, bound in bounds.items()],
+)
+def test_second_order_on_the_boundary_with_the_error_of_the_interior(name, cells, scheme, bound, rng):
+    surface = surfaces.SURFACES[name]()
+    sizes, errors = (12, 24, 48), []
+    for n in sizes:
+        uv, faces = cells(n)
+        uv, faces, _ = shuffled(uv, faces, rng, scheme != "cotan-6")
+        mesh = QuadMesh(surface.mapping(*uv.T), faces)
+        treatment = boundary_treatment(mesh)
+        error = np.abs(mean_curvature(mesh, scheme) - surface.mean_curvature(*uv.T))
+        assert np.isfinite(error[treatment != OPEN]).all()
+        border = error[treatment == EXTRAPOLATED].max()
+        # Near an extraordinary vertex no scheme is of second order.
+        odd = (treatment == INTERIOR) & (mesh.stencils().valence != 4)
+        away = (np.linalg.norm(uv - uv[odd][:, None], axis=2) > 0.5).all(axis=0)
+        assert border < 2 * error[(treatment == INTERIOR) & away].max()
+        errors.append(border)
+    assert fitted_rate(sizes, errors) > 1.9
+    assert errors[-1] < bound
+
+
+@pytest.mark.parametrize("cells", [square, l_shape, annulus, disc(3), disc(5)])
+def test_normals_on_the_boundary_converge(cells):
+    surface = surfaces.catenoid() if cells is annulus else surfaces.tanh_sheet()
+    errors = []
+    for n in (8, 16):
+        uv, faces = cells(n)
+        mesh = QuadMesh(surface.mapping(*uv.T), faces)
+        step = 1e-5
+        sides = [surface.mapping(*(uv + d).T) - surface.mapping(*(uv - d).T) for d in step * np.eye(2)]
+        normal = np.cross(*sides)
+        normal /= np.linalg.norm(normal, axis=1)[:, None]
+        border = boundary_treatment(mesh) == EXTRAPOLATED
+        errors.append(np.linalg.norm(vertex_normals(mesh) - normal, axis=1)[border].max())
+    assert errors[1] < 0.02
+    assert errors[1] < errors[0] / 3.2
+
+
+# ---- where there are no ghosts ------------------------------------------------------------------------
+
+
+def flat(uv):
+    return np.column_stack((uv, uv[:, 0] ** 2))
+
+
+def open_vertices(uv, faces):
+    return uv[boundary_treatment(QuadMesh(flat(uv), faces)) == OPEN]
+
+
+def test_a_reentrant_corner_stays_open_alone():
+    assert open_vertices(*l_shape(8)).tolist() == [[0, 0]]
+
+
+def test_strips_too_short_stay_open():
+    """Four points across are one too few, where the grid of the same points is rejected."""
+    uv, faces = square(8)
+    four, faces = without_unused(uv, faces[uv[faces][:, :, 1].max(axis=1) <= -1 + 3 / 8 + 1e-9])
+    assert len(np.unique(four[:, 1])) == 4
+    treatment = boundary_treatment(QuadMesh(flat(four), faces))
+    short_end = (np.abs(four[:, 0]) == 1) & (np.abs(four[:, 1] + 1 - 1.5 / 8) < 1 / 8)
+    assert np.array_equal(treatment == EXTRAPOLATED, short_end)
+    assert np.count_nonzero(treatment == OPEN) == 2 * 17
+    with pytest.raises(MeshError, match=r"points: 4 columns, but extrapolation .* needs at least 5"):
+        mean_curvature(QuadGrid(flat(four).reshape(17, 4, 3)))
+
+
+def test_a_triangle_at_the_boundary_opens_its_own_vertices_and_their_neighbours():
+    uv, faces = square(8)
+    cut = np.flatnonzero((uv[faces][:, :, 0].min(axis=1) == 0) & (uv[faces][:, :, 1].min(axis=1) == -1))
+    assert cut.size == 1
+    a, b, c, d = faces[cut[0]]
+    rest = np.delete(faces, cut, axis=0).tolist()
+    opened = open_vertices(uv, [*rest, [a, b, c], [c, d, a]])
+    assert sorted(opened.tolist()) == [[-0.125, -1], [0, -1], [0.125, -1], [0.25, -1]]
+
+
+@pytest.mark.parametrize(("valence", "n", "n_open"), [(3, 3, 12), (5, 3, 20), (3, 4, 0), (5, 4, 0)])
+def test_an_extraordinary_vertex_within_four_quads_stops_its_line(valence, n, n_open):
+    """It may be the fifth point of a line. Nearer, the line's end stays open, with the vertices on both
+    sides of it and the corners whose ghost would rest on its ghost.
+    """
+    uv, faces = disc(valence)(n)
+    assert len(open_vertices(uv, faces)) == n_open
+
+
+@pytest.mark.parametrize("touch", [(1, 1), (1, 0)])
+def test_patches_that_touch_in_a_vertex_stay_open_there_alone(touch):
+    """At a corner of both, and at a corner of one in the middle of a side of the other."""
+    uv, faces = square(4)
+    one = np.flatnonzero((uv == touch).all(axis=1))[0]
+    other = np.flatnonzero((uv == (-1, -1)).all(axis=1))[0]
+    faces_of_other = np.where(faces == other, one, faces + len(uv))
+    mesh = QuadMesh(flat(np.vstack((uv, uv + touch + (1, 1)))), np.vstack((faces, faces_of_other)))
+    # The second one of the pair has lost its faces.
+    assert np.flatnonzero(boundary_treatment(mesh) == OPEN).tolist() == [one, len(uv) + other]
+
+
+@pytest.mark.parametrize("faces", [[[0, 1, 2, 3]], [[0, 1, 2, 3], [3, 2, 4, 5]], [[0, 1, 2]]])
+def test_a_face_or_two_have_no_curvature(faces):
+    points = np.array([(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0), (1, 2, 0), (0, 2, 0)], float)
+    mesh = QuadMesh(points, faces)
+    assert (boundary_treatment(mesh) == OPEN).all()
+    for scheme in ("finite_volume", "liu", "cotan-4", "cotan-6"):
+        assert np.isnan(mean_curvature(mesh, scheme)).all()
+
+
+def test_boundaries_can_be_left_open():
+    uv, faces = square(4)
+    mesh = QuadMesh(flat(uv), faces)
+    inside = (np.abs(uv) < 1).all(axis=1)
+    assert np.array_equal(np.isnan(mean_curvature(mesh, boundary="nan")), ~inside)
+    assert np.array_equal(boundary_treatment(mesh, "nan"), np.where(inside, INTERIOR, OPEN))
+    with pytest.raises(ValueError, match="boundary: expected one of"):
+        stencils(mesh, "mirror")
+
+
+def test_the_real_strip(shared_meshes):
+    from quadcurv import read
+
+    with pytest.warns(UserWarning, match="non-orientable"):
+        mesh = read(shared_meshes / "moebius.obj")
+    assert np.bincount(boundary_treatment(mesh)).tolist() == [0, 168, 112]
+    assert np.isfinite(mean_curvature(mesh)).all()
+
+
+# ---- ghost layers of grids ----------------------------------------------------------------------------
+
+
+def test_one_layer_is_the_quartic_formula(rng):
+    points = rng.random((6, 5, 3))
+    index, ghosts = ghost_layer(points, (False, True))
+    assert index.shape == (8, 5)
+    assert np.array_equal(index[1:-1], np.arange(30).reshape(6, 5))
+    X = np.concatenate((points.reshape(-1, 3), ghosts))[index]
+    quartic_formula = 5 * points[0] - 10 * points[1] + 10 * points[2] - 5 * points[3] + points[4]
+    assert np.allclose(X[0], quartic_formula, rtol=0, atol=1e-13)
+
+
+@pytest.mark.parametrize(("degree", "layers"), [(4, 1), (5, 2), (5, 3), (2, 2)])
+def test_layers_lie_on_the_polynomial_of_their_degree_and_no_higher(degree, layers):
+    def grid(power):
+        i, j = np.mgrid[-layers : 7 + layers, -layers : 8 + layers] / 4.0
+        return np.stack((i**power + j, j**power, i**power * j**power), axis=-1)
+
+    inner = (slice(layers, -layers),) * 2
+    for power, exact in ((degree, True), (degree + 1, False)):
+        whole = grid(power)
+        index, ghosts = ghost_layer(whole[inner], (False, False), degree, layers)
+        found = np.concatenate((whole[inner].reshape(-1, 3), ghosts))[index]
+        error = np.abs(found - whole).max() / np.abs(whole).max()
+        assert error < 1e-12 if exact else error > 1e-4
+
+
+def test_two_quintic_layers_are_of_sixth_order():
+    sizes, errors = (10, 20, 40), []
+    for n in sizes:
+        t = np.arange(-2, n + 3) / n
+        whole = np.stack((*np.meshgrid(t, t, indexing="ij"), np.sin(t[:, None] + 2 * t)), axis=-1)
+        index, ghosts = ghost_layer(whole[2:-2, 2:-2], (False, False), 5, 2)
+        found = np.concatenate((whole[2:-2, 2:-2].reshape(-1, 3), ghosts))[index]
+        errors.append(np.abs(found - whole).max())
+    assert fitted_rate(sizes, errors) > 5.5
+    assert errors[-1] < 1e-5
+
+
+def test_layers_need_points():
+    with pytest.raises(MeshError, match=r"points: 5 rows, but extrapolation .* needs at least 6"):
+        ghost_layer(np.zeros((5, 9, 3)), (False, False), degree=5, layers=2)
