@@ -1,35 +1,53 @@
 """Mean curvature on quad meshes and logically Cartesian grids, with every operator side by side."""
 
 from quadcurv.boundary import stencils
+from quadcurv.convert import as_grid, duplicate_points, merge_points, pair_triangles
 from quadcurv.curvature import (
     dual_areas,
+    evaluate,
+    gaussian_curvature,
     mass_matrix,
     mean_curvature,
     mean_curvature_normal,
+    principal_curvatures,
     stiffness_matrix,
     vertex_normals,
 )
-from quadcurv.interop import as_mesh, read
-from quadcurv.mesh import CornerTable, MeshError, QuadGrid, QuadMesh, StaggeredGrid, Stencils
-from quadcurv.schemes import SCHEMES, Scheme
+from quadcurv.interop import as_mesh, attach, read, write
+from quadcurv.kernels.parallel import set_threads
+from quadcurv.mesh import CornerTable, MeshError, QuadGrid, QuadMesh, Recovery, StaggeredGrid, Stencils
+from quadcurv.schemes import SCHEMES, Curvatures, Fit, Scheme
 
 __all__ = [
     "SCHEMES",
     "CornerTable",
+    "Curvatures",
+    "Fit",
     "MeshError",
     "QuadGrid",
     "QuadMesh",
+    "Recovery",
     "Scheme",
     "StaggeredGrid",
     "Stencils",
+    "as_grid",
     "as_mesh",
+    "attach",
     "dual_areas",
+    "duplicate_points",
+    "evaluate",
+    "gaussian_curvature",
     "mass_matrix",
     "mean_curvature",
     "mean_curvature_normal",
+    "merge_points",
+    "pair_triangles",
+    "principal_curvatures",
     "read",
+    "set_threads",
     "stencils",
     "stiffness_matrix",
     "vertex_normals",
+    "write",
 ]
 __version__ = "0.1.0"

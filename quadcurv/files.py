@@ -1,0 +1,271 @@
+"""OBJ, OFF and PLY files as points and polygons: plain arrays in and out, in double precision.
+
+The libraries at hand do not keep both polygons and doubles: trimesh splits polygons and cannot read
+binary PLY with faces of several sizes, VTK reads PLY in single precision, OBJ with vertices split at
+texture seams and OFF not at all, libigl wants faces of one size, plyfile is GPL.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from quadcurv.mesh import Floats, Ints, MeshError
+
+Polygons = NDArray[np.int64] | list[list[int]]
+
+PlyElements = dict[str, tuple[int, list[tuple[str, ...]]]]
+PLY_TYPES = {
+    **dict.fromkeys(("char", "int8"), "i1"),
+    **dict.fromkeys(("uchar", "uint8"), "u1"),
+    **dict.fromkeys(("short", "int16"), "i2"),
+    **dict.fromkeys(("ushort", "uint16"), "u2"),
+    **dict.fromkeys(("int", "int32"), "i4"),
+    **dict.fromkeys(("uint", "uint32"), "u4"),
+    **dict.fromkeys(("float", "float32"), "f4"),
+    **dict.fromkeys(("double", "float64"), "f8"),
+}
+
+
+def polygons(sizes: Sequence[int] | NDArray[Any], vertices: Sequence[int] | NDArray[Any]) -> Polygons:
+    """Faces of `sizes` corners each, listed one after the other in `vertices`.
+
+    Returns
+    -------
+    (m, 4) int64 or list of list of int
+        A table, -1 after the corners of a triangle, where all faces are triangles and quads.
+
+    Raises
+    ------
+    MeshError
+        A ValueError: an index that is negative (the table could not tell it from the mark of a triangle)
+        or, as text formats may have it, no whole number.
+    """
+    sizes, given = np.asarray(sizes, np.int64), np.asarray(vertices)
+    ends = np.cumsum(sizes)
+    if (sizes < 0).any() or sizes.sum() != len(given):
+        raise MeshError(f"faces: {len(given)} corners do not make {len(sizes)} faces of the sizes given")
+    with np.errstate(invalid="ignore"):
+        vertices = given.astype(np.int64)
+    bad = (vertices < 0) | (vertices != given)
+    if bad.any():
+        face = int(np.searchsorted(ends, np.argmax(bad), side="right"))
+        raise MeshError(f"faces: {np.count_nonzero(bad)} invalid indices, first face {face}: {given[bad][0]}")
+    if np.isin(sizes, (3, 4)).all():
+        table = np.full((len(sizes), 4), -1, np.int64)
+        table[np.arange(4) < sizes[:, None]] = vertices
+        return table
+    return [face.tolist() for face in np.split(vertices, ends[:-1])]
+
+
+def read_obj(path: Path) -> tuple[Floats, Polygons]:
+    """Positions and polygons of an OBJ file; texture and normal indices do not split vertices."""
+    points: list[list[float]] = []
+    sizes: list[int] = []
+    corners: list[int] = []
+    text = path.read_text(encoding="utf-8", errors="replace").replace("\\\n", " ")
+    for number, line in enumerate(text.splitlines(), 1):
+        kind, *words = line.partition("#")[0].split() or [""]
+        try:
+            if kind == "v":
+                x, y, z = map(float, words[:3])
+                points.append([x, y, z])
+            elif kind == "f":
+                sizes.append(len(words))
+                for word in words:
+                    index = int(word.partition("/")[0])
+                    # Counted from 1, or back from the last vertex read.
+                    corners.append(index - 1 if index > 0 else len(points) + index if index else -1)
+        except ValueError:
+            raise MeshError(f"line {number}: {line.strip()!r} is not OBJ") from None
+    return np.array(points, float).reshape(-1, 3), polygons(sizes, corners)
+
+
+def read_off(path: Path) -> tuple[Floats, Polygons]:
+    """Positions and polygons of an ASCII OFF file; normals and colours are skipped."""
+    text = path.read_text(encoding="utf-8", errors="replace")
+    lines = [line for raw in text.splitlines() if (line := raw.partition("#")[0].strip())]
+    start = re.match(r"(ST)?C?N?OFF\b(.*)", lines[0] if lines else "")
+    if not start or "BINARY" in start[2]:
+        raise MeshError("not an ASCII OFF file in three dimensions")
+    lines[:1] = [start[2]] if start[2].strip() else []
+    try:
+        n, m = map(int, lines[0].split()[:2])
+        points = np.array([line.split()[:3] for line in lines[1 : n + 1]], float).reshape(n, 3)
+        rows = [line.split() for line in lines[n + 1 : n + m + 1]]
+        sizes = [int(row[0]) for row in rows]
+        faces = [[int(v) for v in row[1 : size + 1]] for row, size in zip(rows, sizes, strict=True)]
+        if len(rows) != m or [len(face) for face in faces] != sizes:
+            raise ValueError("the face list is cut short")
+    except (ValueError, IndexError) as error:
+        raise MeshError(f"not an OFF file: {error}") from None
+    return points, polygons(sizes, [v for face in faces for v in face])
+
+
+def read_ply(path: Path) -> tuple[Floats, Polygons]:
+    """Positions and polygons of a PLY file, ASCII or binary."""
+    header, _, body = path.read_bytes().partition(b"end_header")
+    try:
+        order, elements = _ply_header(header.decode("ascii", errors="replace"))
+        if order:
+            offset = 2 if body.startswith(b"\r\n") else 1
+        else:  # numbers as text: from here on doubles
+            body, order, offset = np.array(body.split(), float).tobytes(), "=", 0
+            elements = {e: (n, [(k, *["f8"] * len(t)) for k, *t in p]) for e, (n, p) in elements.items()}
+        data: dict[str, dict[str, Any]] = {}
+        for element, (count, properties) in elements.items():
+            data[element], offset = _ply_element(body, offset, order, count, properties)
+        points = np.stack([data["vertex"][axis] for axis in "xyz"], axis=-1).astype(float)
+        faces = data.get("face", {})
+        names = [k for k in ("vertex_indices", "vertex_index") if k in faces]
+        sizes, corners = faces[names[0]] if names else ([], [])
+    except (ValueError, TypeError, OverflowError) as error:
+        raise MeshError(f"not a PLY file: {error}") from None
+    except KeyError as error:
+        raise MeshError(f"not a PLY file of a mesh: no {error}") from None
+    return points, polygons(sizes, corners)
+
+
+def _ply_header(header: str) -> tuple[str, PlyElements]:
+    """Byte order ("" for ASCII), and for every element how many there are and (name, type, type) ..."""
+    first, *lines = header.split("\n")
+    if first.strip() != "ply":
+        raise ValueError("it does not begin with 'ply'")
+    order, elements = None, PlyElements()
+    properties: list[tuple[str, ...]] = []
+    for line in lines:
+        match line.split():
+            case ["format", kind, _]:
+                order = {"ascii": "", "binary_little_endian": "<", "binary_big_endian": ">"}.get(kind)
+            case ["element", name, count]:
+                properties = []
+                elements[name] = int(count), properties
+            case ["property", "list", count_type, item_type, name]:
+                properties.append((name, PLY_TYPES[count_type], PLY_TYPES[item_type]))
+            case ["property", item_type, name]:
+                properties.append((name, PLY_TYPES[item_type]))
+            case ["property" | "element" | "format", *_]:
+                raise ValueError(f"header line {line.strip()!r}")
+    if order is None:
+        raise ValueError("no known format in its header")
+    return order, elements
+
+
+def _ply_element(
+    body: bytes, offset: int, order: str, count: int, properties: list[tuple[str, ...]]
+) -> tuple[dict[str, Any], int]:
+    """Columns of an element, lists as (sizes, items), and where the next element begins."""
+    if count <= 0:
+        return {}, offset
+    # As if every list were as long as the first of its name; true of most files.
+    fields: list[tuple[Any, ...]] = []
+    end = offset
+    for name, *types in properties:
+        if len(types) == 2:
+            length = int(np.frombuffer(body, order + types[0], 1, end)[0])
+            fields += [(f"{name} size", order + types[0]), (name, order + types[1], (max(length, 0),))]
+        else:
+            fields.append((name, order + types[0]))
+        end = offset + np.dtype(fields).itemsize
+    lists = [name for name, *types in properties if len(types) == 2]
+    row = np.dtype(fields)
+    if not lists or offset + count * row.itemsize <= len(body):
+        table = np.frombuffer(body, row, count, offset)
+        if all((table[f"{k} size"] == table[k].shape[1]).all() for k in lists):
+            columns: dict[str, Any] = {name: table[name] for name, *_ in properties}
+            for k in lists:
+                columns[k] = table[f"{k} size"], table[k].ravel()
+            return columns, offset + table.nbytes
+    ragged: dict[str, list[Any]] = {name: [] for name, *_ in properties}
+    for _ in range(count):
+        for name, *types in properties:
+            length = 1
+            if len(types) == 2:
+                length = int(np.frombuffer(body, order + types[0], 1, offset)[0])
+                offset += np.dtype(types[0]).itemsize
+                if length < 0:
+                    raise ValueError(f"a list of {length} items")
+            ragged[name].append(np.frombuffer(body, order + types[-1], length, offset) if length else ())
+            offset += length * np.dtype(types[-1]).itemsize
+    columns = {name: np.concatenate(items) for name, items in ragged.items()}
+    for k in lists:
+        columns[k] = [len(items) for items in ragged[k]], columns[k]
+    return columns, offset
+
+
+def write_obj(path: Path, points: Floats, faces: Ints) -> None:
+    """OBJ with every digit of the positions."""
+    lines = ["v " + " ".join(map(repr, point)) for point in points.tolist()]
+    lines += ["f " + " ".join(str(v + 1) for v in face if v >= 0) for face in faces.tolist()]
+    path.write_text("\n".join(lines) + "\n", encoding="ascii")
+
+
+def write_off(path: Path, points: Floats, faces: Ints) -> None:
+    """OFF with every digit of the positions."""
+    lines = ["OFF", f"{len(points)} {len(faces)} 0"]
+    lines += [" ".join(map(repr, point)) for point in points.tolist()]
+    polygon = [[v for v in face if v >= 0] for face in faces.tolist()]
+    lines += [" ".join(map(str, (len(face), *face))) for face in polygon]
+    path.write_text("\n".join(lines) + "\n", encoding="ascii")
+
+
+def write_ply(path: Path, points: Floats, faces: Ints, point_data: Mapping[str, NDArray[Any]]) -> None:
+    """Binary PLY; values (n,) as a property of that name, (n, 3) as name_x, name_y, name_z.
+
+    Values named "normal" or "normals" become nx, ny, nz, which other readers take for normals. Booleans
+    are stored as uchar, integers as int where they fit, all else as double.
+
+    Raises
+    ------
+    MeshError
+        A ValueError: names that repeat, or are no words of ASCII.
+    """
+    columns = dict(zip("xyz", points.T, strict=True))
+    for name, values in point_data.items():
+        if values.ndim == 1:
+            columns[name] = values
+        else:
+            keys = (
+                ["nx", "ny", "nz"]
+                if name.lower() in ("normal", "normals")
+                else [f"{name}_{k}" for k in "xyz"]
+            )
+            columns.update(zip(keys, values.T, strict=True))
+    if len(columns) < 3 + sum(v.size for v in point_data.values()) // len(points):
+        raise MeshError(f"point_data: names {list(point_data)} repeat each other's or x, y, z in a PLY file")
+    if bad := [name for name in columns if not name.isascii() or len(name.split()) != 1]:
+        raise MeshError(f"point_data: {bad[0]!r} is no PLY name: one word of ASCII letters")
+    vertices = np.empty(len(points), [(name, _ply_type(values)) for name, values in columns.items()])
+    for name, values in columns.items():
+        vertices[name] = values
+    spelled = {"u1": "uchar", "i4": "int", "f8": "double"}
+    header = ["ply", "format binary_little_endian 1.0", f"element vertex {len(points)}"]
+    header += [f"property {spelled[vertices.dtype[k].str[1:]]} {k}" for k in columns]
+    header += [f"element face {len(faces)}", "property list uchar int vertex_indices", "end_header", ""]
+    corner = faces >= 0
+    rows = np.empty((len(faces), 17), np.uint8)
+    rows[:, 0] = corner.sum(axis=1)
+    rows[:, 1:] = faces.astype("<i4").view(np.uint8)
+    kept = np.repeat(np.c_[corner[:, :1], corner], [1, 4, 4, 4, 4], axis=1)
+    path.write_bytes("\n".join(header).encode("ascii") + vertices.tobytes() + rows[kept].tobytes())
+
+
+def _ply_type(values: NDArray[Any]) -> str:
+    if values.dtype.kind == "b":
+        return "<u1"
+    int32 = np.iinfo(np.int32)
+    if values.dtype.kind in "iu" and int32.min <= values.min() and values.max() <= int32.max:
+        return "<i4"
+    return "<f8"
+
+
+READERS: dict[str, Callable[[Path], tuple[Floats, Polygons]]] = {
+    ".obj": read_obj,
+    ".off": read_off,
+    ".ply": read_ply,
+}
