@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from itertools import combinations
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -20,8 +20,12 @@ from quadcurv.curvature import dual_areas, mean_curvature
 from quadcurv.interop import as_mesh
 from quadcurv.mesh import Floats, Ints, Mesh
 from quadcurv.rates import fitted_rate, successive_rates
-from quadcurv.schemes import SCHEMES, Scheme, as_scheme
+from quadcurv.schemes import SCHEMES, Fit, Scheme, as_scheme
 from quadcurv.surfaces import Surface
+
+if TYPE_CHECKING:
+    import pyvista as pv
+    from matplotlib.figure import Figure
 
 _ROUNDING = 1e-9
 NORMS = ("one", "two", "inf", "one-area", "two-area")
@@ -170,20 +174,36 @@ class Comparison:
             valence.add_row(name, *(_short(e[name]["one"]) for e in groups.values()))
         if self.exact is not None:
             return [main, valence]
-        numbers = [str(i + 1) for i in range(len(self.schemes))]
-        pairs = _table("Mean difference |H - H'| between schemes", ["", *numbers])
+        number = {name: str(i + 1) for i, name in enumerate(self.schemes)}
         mean = {pair: _short(d["one"]) for pair, d in self.differences().items()}
-        for i, a in zip(numbers, self.schemes, strict=True):
-            pairs.add_row(f"{i} {a}", *(mean.get((a, b), mean.get((b, a), "-")) for b in self.schemes))
-        return [main, valence, pairs]
+        tables = [main, valence]
+        for start in range(0, len(number), 8):  # more columns do not fit
+            columns = self.schemes[start : start + 8]
+            pairs = _table("Mean difference |H - H'| between schemes", ["", *(number[b] for b in columns)])
+            for a in self.schemes:
+                pairs.add_row(f"{number[a]} {a}", *(mean.get((a, b), mean.get((b, a), "-")) for b in columns))
+            tables.append(pairs)
+        return tables
 
     def __rich_console__(self, console: Console, options: Any) -> Iterator[Table]:
         yield from self.tables()
 
+    def plot(self, field: str = "error") -> pv.Plotter:
+        """Maps of a field, one view a scheme: a scene to show or save, see :func:`quadcurv.view.maps`."""
+        from quadcurv.view import maps
+
+        return maps(self, field)
+
+    def view(self, field: str = "mean_curvature") -> None:
+        """Open a window with linked views, one a scheme, see :class:`quadcurv.view.View`."""
+        from quadcurv.view import view
+
+        view(self, field)
+
 
 def compare(
     mesh: Any,
-    schemes: Iterable[str | Scheme] | None = None,
+    schemes: Iterable[str | Scheme | Fit] | None = None,
     exact: ArrayLike | Callable[[Floats], ArrayLike] | None = None,
     boundary: str = "extrapolate",
 ) -> Comparison:
@@ -269,6 +289,11 @@ class Convergence:
         start = 0 if last is None else -last
         return fitted_rate(self.sizes[start:], self.errors[scheme][norm][start:])
 
+    def rate_label(self, scheme: str, norm: str = "one") -> str:
+        """Fitted rate to two digits, "exact" where all errors are rounding."""
+        exact = self.errors[scheme][norm].max() < _ROUNDING
+        return "exact" if exact else f"{self.fitted_rate(scheme, norm):.2f}"
+
     def rows(self) -> list[dict[str, Any]]:
         """One flat record a scheme, shape and norm, with the rate from the shape before."""
         return [
@@ -331,10 +356,15 @@ class Convergence:
         for scheme in self.schemes:
             rates = ("" if np.isnan(r) else f"{r:.2f}" for r in self.rates(scheme, norm))
             errors = self.errors[scheme][norm]
-            fit = "exact" if errors.max() < _ROUNDING else f"{self.fitted_rate(scheme, norm):.2f}"
-            table.add_row(scheme, *map(_short, errors), fit)
+            table.add_row(scheme, *map(_short, errors), self.rate_label(scheme, norm))
             table.add_row("", "", *rates, "", style="dim")
         return table
+
+    def plot(self, norms: Sequence[str] = ("one", "inf")) -> Figure:
+        """Errors against cells on logarithmic axes, see :func:`quadcurv.figures.convergence_figure`."""
+        from quadcurv.figures import convergence_figure
+
+        return convergence_figure(self, norms)
 
     def __rich_console__(self, console: Console, options: Any) -> Iterator[Table]:
         yield self.table("one")
@@ -343,7 +373,7 @@ class Convergence:
 
 def convergence(
     surface: Surface,
-    schemes: Iterable[str | Scheme],
+    schemes: Iterable[str | Scheme | Fit],
     shapes: Iterable[int | tuple[int, int]],
     layout: str = "staggered",
 ) -> Convergence:
