@@ -2,7 +2,6 @@
 
 import argparse
 import csv
-import os
 from collections.abc import Mapping, Sequence
 from dataclasses import astuple, dataclass, fields
 from pathlib import Path
@@ -15,13 +14,15 @@ from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
 from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 from rich.console import Console
 from rich.table import Table
 
+from quadcurv import view
+from quadcurv.compare import Comparison
+from quadcurv.curvature import dual_areas
 from quadcurv.mesh import Mesh, QuadGrid, StaggeredGrid
 from quadcurv.rates import fitted_rate
-from quadcurv.view import opengl_problem
 
 # Okabe and Ito (2008): told apart with every kind of colour blindness.
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
@@ -209,11 +210,12 @@ def save_maps(
     label: str = "",
     decades: tuple[int, int] | None = None,
     camera: tuple[float, float, float] = (1.0, 1.0, 0.7),
-    size: tuple[float, float] = (6.8, 3.2),
+    height: float = 3.2,
 ) -> str | None:
     """Paint values on surfaces side by side, on one scale: output/stem.png, .svg and .csv.
 
-    Where nothing can render, pages output/stem_1.html, ... take the place of the pictures.
+    Where nothing can render, pages output/stem_1.html, ..., each on a scale of its own, take the place
+    of the pictures.
 
     Parameters
     ----------
@@ -228,8 +230,8 @@ def save_maps(
         on a linear scale, without a bar.
     camera : (x, y, z)
         Direction from the surface to the viewer.
-    size : (width, height)
-        Of the figure in inches.
+    height : float
+        Of the figure in inches; the panels give its width.
 
     Returns
     -------
@@ -237,27 +239,22 @@ def save_maps(
         Why nothing can render, if so.
     """
     output.mkdir(parents=True, exist_ok=True)
-    problem = opengl_problem()
-    if problem:  # VTK then describes the scene without opening a context
-        os.environ["VTK_DEFAULT_OPENGL_WINDOW"] = "vtkOSOpenGLRenderWindow"
-    images, table = {}, []
-    for i, (title, (mesh, given)) in enumerate(panels.items(), 1):
-        values = np.asarray(given, dtype=float)
-        plotter = _scene(mesh, values, decades, camera)
-        if problem:
-            plotter.export_html(output / f"{stem}_{i}.html")
-        else:
-            picture = np.asarray(plotter.screenshot(transparent_background=True, return_img=True))
-            rows, columns = (np.flatnonzero(picture[..., 3].any(axis=axis)) for axis in (1, 0))
-            images[title] = picture[rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1]
-        plotter.close()
-        stencils = mesh.stencils()
-        table += [(title, *x, v) for x, v in zip(stencils.points[: stencils.n], values.ravel(), strict=True)]
-    write_csv(output, stem, dict(zip(("panel", "x", "y", "z", "value"), zip(*table, strict=True), strict=True)))
+    table = [
+        (title, *x, v)
+        for title, (mesh, values) in panels.items()
+        for x, v in zip(mesh.stencils().points, np.ravel(values).tolist(), strict=False)
+    ]
+    header = ("panel", "x", "y", "z", "value")
+    write_csv(output, stem, dict(zip(header, zip(*table, strict=True), strict=True)))
+    problem = view.opengl_problem()
     if problem:
+        for i, (title, (mesh, values)) in enumerate(panels.items(), 1):
+            view.save_maps(_as_error(mesh, title, values), output / f"{stem}_{i}.html")
         return problem
+    images = {title: _picture(*panel, decades, camera) for title, panel in panels.items()}
     widths = [image.shape[1] / image.shape[0] for image in images.values()]
-    fig, axes = figure(1, len(images), size, width_ratios=widths, squeeze=False)
+    width = 0.9 * height * sum(widths) + 0.3 * len(images) + (0.9 if decades else 0)
+    fig, axes = figure(1, len(images), (width, height), width_ratios=widths, squeeze=False)
     for ax, (title, image) in zip(axes.flat, images.items(), strict=True):
         ax.imshow(image, interpolation="antialiased")
         ax.set_title(title)
@@ -273,35 +270,48 @@ def save_maps(
     return None
 
 
-def _scene(mesh: Mesh, values: Any, decades: tuple[int, int] | None, camera: tuple[float, ...]) -> Any:
-    """Plotter with one surface, edges drawn where they can be told apart."""
+def _as_error(mesh: Mesh, title: str, values: ArrayLike) -> Comparison:
+    """Comparison whose errors are the given values."""
+    stencils = mesh.stencils()
+    e = np.reshape(values, stencils.shape)
+    valence = stencils.valence.reshape(stencils.shape)
+    return Comparison(mesh, {title: e}, np.zeros(stencils.shape), dual_areas(mesh, "liu"), valence)
+
+
+def _picture(
+    mesh: Mesh, given: ArrayLike, decades: tuple[int, int] | None, camera: tuple[float, ...]
+) -> NDArray[np.uint8]:
+    """Painted surface, without the empty margin; edges are drawn where they can be told apart."""
     import pyvista as pv
 
     corners = QuadGrid(mesh.dual) if isinstance(mesh, StaggeredGrid) else mesh
     stencils = corners.stencils()
-    surface = pv.PolyData.from_regular_faces(np.array(stencils.points), stencils.faces)
-    data = surface.cell_data if isinstance(mesh, StaggeredGrid) else surface.point_data
-    data["value"] = values.ravel()
+    surface = pv.PolyData.from_regular_faces(np.array(stencils.points), stencils.faces.astype(int))
+    values = np.ravel(given)
     mapper: dict[str, Any] = {"smooth_shading": True, "specular": 0.2, "ambient": 0.25}
     if decades is not None:
-        data["value"] = np.log10(np.maximum(values.ravel(), 10.0 ** decades[0]))
+        values = np.log10(np.maximum(values, 10.0 ** decades[0]))
         mapper = {"lighting": False, "clim": decades}
-    plotter = pv.Plotter(off_screen=True, window_size=(1200, 1200))
-    plotter.enable_parallel_projection()
-    plotter.enable_anti_aliasing("ssaa")
-    plotter.add_mesh(
-        surface,
-        scalars="value",
-        cmap=MAP,
-        show_edges=surface.n_cells <= 20_000,
-        edge_opacity=0.25,
-        nan_color="#d0d0d0",
-        show_scalar_bar=False,
-        **mapper,
-    )
-    plotter.view_vector(camera, viewup=(0, 0, 1))
-    plotter.camera.zoom(1.3)
-    return plotter
+    (surface.cell_data if isinstance(mesh, StaggeredGrid) else surface.point_data)["value"] = values
+    with pv.vtk_verbosity("off"):  # it would warn of every way to draw that it tries in vain
+        plotter: Any = pv.Plotter(off_screen=True, window_size=[1200, 1200])
+        plotter.enable_parallel_projection()
+        plotter.enable_anti_aliasing("msaa")
+        plotter.add_mesh(
+            surface,
+            scalars="value",
+            cmap=MAP,
+            show_edges=surface.n_cells <= 20_000,
+            edge_opacity=0.25,
+            nan_color="#d0d0d0",
+            show_scalar_bar=False,
+            **mapper,
+        )
+        plotter.view_vector(camera, viewup=(0, 0, 1))
+        image = np.asarray(plotter.screenshot(transparent_background=True, return_img=True))
+        plotter.close()
+    rows, columns = (np.flatnonzero(image[..., 3].any(axis=axis)) for axis in (1, 0))
+    return image[rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1]
 
 
 def arguments(description: str | None) -> argparse.Namespace:

@@ -1,0 +1,566 @@
+"""Time and memory of the fast schemes beside other libraries and beside a copy of the same bytes.
+
+All contestants of a table run in one process in turn, round after round; what is given is the median over
+the rounds of the ratio within a round, and its quartiles. Run on a quiet computer:
+
+    python -m comparisons.performance
+"""
+
+from __future__ import annotations
+
+import os
+import platform
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from types import FunctionType
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+import quadcurv as qc
+from comparisons.common import COLOURS, MARKERS, arguments, figure, paper_style, save_figure
+from quadcurv.kernels import diamond, parallel
+from quadcurv.schemes.diamond import quad_stiffness
+
+Floats = NDArray[np.float64]
+Job = Callable[[], Any]
+REPORT = Path(__file__).with_name("PERFORMANCE.md")
+SIZES = (256, 1024, 2048)  # vertices in each direction: 65 thousand, 1 and 4 million
+PEERS = ("libigl", "vtk", "pymeshlab", "robust-laplacian", "scipy", "numpy", "numba")
+THESIS_OPERATIONS = 197  # a vertex of the thesis's implementation, its section 3.4
+
+
+@dataclass(frozen=True)
+class Ratio:
+    """A ratio of two times (or bytes): median and quartiles over the rounds, and what it is to reach.
+
+    Attributes
+    ----------
+    name, against : str
+    vertices, threads : int
+    low, median, high : float
+    must, aim : float
+        NaN where nothing is asked. A ratio that has to be small has must >= aim, others must <= aim.
+    """
+
+    name: str
+    against: str
+    vertices: int
+    threads: int
+    low: float
+    median: float
+    high: float
+    must: float = np.nan
+    aim: float = np.nan
+
+    @property
+    def verdict(self) -> str:
+        """Which of the two is reached."""
+        if np.isnan(self.must):
+            return ""
+        sign = 1 if self.must <= self.aim else -1
+        if sign * self.median >= sign * self.aim:
+            return "aim"
+        return "must" if sign * self.median >= sign * self.must else "missed"
+
+
+def torus(n: int) -> Floats:
+    """(n, n, 3) points that wrap in both directions; the normal points outward."""
+    u, v = np.meshgrid(*[2 * np.pi * np.arange(n) / n] * 2, indexing="ij")
+    r = 3 + np.cos(u) + 0.2 * np.sin(3 * v)
+    return np.stack([r * np.cos(v), r * np.sin(v), np.sin(u)], axis=-1)
+
+
+def numpy_finite_volume(points: Floats) -> Floats:
+    """H n of the finite-volume scheme on a grid that wraps, as one writes it with whole arrays."""
+
+    def at(i: int, j: int) -> Floats:
+        return np.roll(points, (-i, -j), axis=(0, 1))
+
+    flux = np.zeros_like(points)
+    for a, d, b in (
+        ((1, 0), (1, 1), (0, 1)),
+        ((0, 1), (-1, 1), (-1, 0)),
+        ((-1, 0), (-1, -1), (0, -1)),
+        ((0, -1), (1, -1), (1, 0)),
+    ):
+        t1, t2 = at(*d) - points, at(*b) - at(*a)
+        t11 = (t1 * t1).sum(axis=-1, keepdims=True)
+        t12 = (t1 * t2).sum(axis=-1, keepdims=True)
+        t22 = (t2 * t2).sum(axis=-1, keepdims=True)
+        flux += (t22 * t1 - t12 * t2) / np.sqrt(t11 * t22 - t12**2)
+    area = np.linalg.norm(np.cross(at(1, 0) - at(-1, 0), at(0, 1) - at(0, -1)), axis=-1, keepdims=True) / 2
+    return flux / (2 * area)
+
+
+def operations() -> dict[str, int]:
+    """Floating-point operations a vertex of H n on a grid, counted while the kernels' own code runs.
+
+    Returns
+    -------
+    dict
+        "flux", "finish": of one quad and of one vertex. "differences": 2 x 3 for the diagonals of the quad
+        and as many for those of the ring. "sums": 3 x 3 of fluxes into vertices; each quad's four fluxes are two
+        and their opposites. "all": the total.
+    """
+    count = 0
+
+    class Counted(float):
+        pass
+
+    def counting(name: str) -> Callable[[float, float], Counted]:
+        def operator(a: float, b: float) -> Counted:
+            nonlocal count
+            count += 1
+            return Counted(getattr(float, name)(float(a), float(b)))
+
+        return operator
+
+    for name in ("add", "sub", "mul", "truediv"):
+        for kind in ("__{}__", "__r{}__"):
+            setattr(Counted, kind.format(name), counting(kind.format(name)))
+
+    def root(x: float) -> Counted:
+        nonlocal count
+        count += 1
+        return Counted(np.sqrt(x))
+
+    def run(kernel: Any, *given: Any) -> int:
+        nonlocal count
+        count = 0
+        code = kernel.py_func
+        FunctionType(code.__code__, {**code.__globals__, "sqrt": root})(*given)
+        return count
+
+    x = [Counted(v) for v in (1.0, 0.2, 0.3, -0.1, 1.1, 0.4)]
+    parts = {
+        "differences": 12,
+        "flux": run(diamond.flux, *x),
+        "sums": 9,
+        # The flux and two diagonals; Liu's sum of areas is not asked for, and H n alone wanted.
+        "finish": run(diamond.finish, 0, *x[:3], *x, None, 0.0, np.empty(3), None, None, None),
+    }
+    return {**parts, "all": sum(parts.values())}
+
+
+def rounds(jobs: Mapping[str, Job], count: int) -> dict[str, Floats]:
+    """Wall time of each job in each round; all run once beforehand."""
+    for job in jobs.values():
+        job()
+    times = np.empty((len(jobs), count))
+    for k in range(count):
+        for i, job in enumerate(jobs.values()):
+            begin = time.perf_counter()
+            job()
+            times[i, k] = time.perf_counter() - begin
+    return dict(zip(jobs, times, strict=True))
+
+
+def ratio(name: str, against: str, times: Mapping[str, Floats], small: bool, **rest: Any) -> Ratio:
+    """Ratio of times within a round, of `name` to `against` where it is to be small, else of these to it."""
+    quotient = times[name] / times[against] if small else times[against] / times[name]
+    low, median, high = np.quantile(quotient, (0.25, 0.5, 0.75))
+    return Ratio(name, against, low=low, median=median, high=high, **rest)
+
+
+def grid_jobs(n: int) -> dict[str, Job]:
+    """The grid passes, a copy of the bytes they read and write, and the scheme by numpy."""
+    points = torus(n)
+    closed, open_ = qc.QuadGrid(points, (True, True)), qc.QuadGrid(points[:, :, :])
+    out = {"mean_curvature_normal": np.empty_like(points)}
+    target = out["mean_curvature_normal"]
+
+    def copy() -> None:
+        parallel.over(lambda i, j: np.copyto(target[i:j], points[i:j]), n, n * n)
+
+    jobs: dict[str, Job] = {"copy": copy}
+    for scheme in ("finite_volume", "liu"):
+        for kind, grid in (("wrapped", closed), ("open", open_)):
+            jobs[f"{scheme}, {kind} grid"] = lambda g=grid, s=scheme: qc.evaluate(g, scheme=s, out=out)
+    jobs["numpy"] = lambda: numpy_finite_volume(points)
+    return jobs
+
+
+def face_lists(n: int) -> dict[str, tuple[Floats, NDArray[np.int64]]]:
+    """The torus as a face list, in natural order and with vertices and faces shuffled."""
+    points = torus(n).reshape(-1, 3)
+    faces = qc.QuadGrid(torus(n), (True, True)).stencils().faces.astype(np.int64)
+    rng = np.random.default_rng(0)
+    order = rng.permutation(len(points))
+    shuffled = np.argsort(order)[faces][rng.permutation(len(faces))]
+    return {"natural": (points, faces), "shuffled": (points[order], shuffled)}
+
+
+def triangles(faces: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Each quad cut along its first diagonal."""
+    return np.ascontiguousarray(np.concatenate((faces[:, [0, 1, 2]], faces[:, [2, 3, 0]])))
+
+
+def peer_jobs(points: Floats, faces: NDArray[np.int64]) -> Iterator[tuple[str, Job]]:
+    """Mean curvature by every other library that is installed; meshes are made beforehand."""
+    cut, n = triangles(faces), len(points)
+    import igl
+
+    def cotan() -> Any:
+        return igl.massmatrix(points, cut), igl.cotmatrix(points, cut) @ points
+
+    yield "libigl", cotan
+
+    import pyvista
+    import vtk
+
+    surface = pyvista.PolyData.from_regular_faces(points, cut)
+    curvatures = vtk.vtkCurvatures()
+    curvatures.SetInputData(surface)
+    curvatures.SetCurvatureTypeToMean()
+
+    def mean() -> None:
+        curvatures.Modified()
+        curvatures.Update()
+
+    yield "VTK", mean
+    if n <= 2**20:
+        try:
+            import pymeshlab
+        except ImportError:
+            pass
+        else:
+            meshes = pymeshlab.MeshSet()
+            meshes.add_mesh(pymeshlab.Mesh(points, cut))
+            yield (
+                "MeshLab",
+                lambda: meshes.compute_scalar_by_discrete_curvature_per_vertex(
+                    curvaturetype="Mean Curvature"
+                ),
+            )
+        try:
+            import robust_laplacian
+        except ImportError:
+            pass
+        else:
+            yield "robust_laplacian", lambda: robust_laplacian.mesh_laplacian(points, cut)[0] @ points
+    if n <= 2**16:
+        yield "igl.principal_curvature", lambda: igl.principal_curvature(points, cut)
+
+
+def face_jobs(n: int) -> dict[str, Job]:
+    """Face lists, once and repeatedly, in natural and in shuffled order; stiffness matrices."""
+    import igl
+    import scipy.sparse
+
+    lists = face_lists(n)
+    points, faces = lists["natural"]
+    cut = triangles(faces)
+    jobs: dict[str, Job] = {}
+    for scheme in ("finite_volume", "liu"):
+        for kind, (x, f) in lists.items():
+            mesh = qc.QuadMesh(x, f)
+            qc.mean_curvature_normal(mesh.with_points(x), scheme)
+            jobs[f"{scheme}, repeated, {kind}"] = lambda m=mesh, x=x, s=scheme: qc.mean_curvature_normal(
+                m.with_points(x), s
+            )
+    for kind, (x, f) in lists.items():
+        jobs[f"finite_volume, one call, {kind}"] = lambda x=x, f=f: qc.mean_curvature_normal((x, f))
+    jobs |= peer_jobs(points, faces)
+
+    mesh = qc.QuadMesh(points, faces)
+    stencils = mesh.stencils()
+    S = qc.stiffness_matrix(mesh)
+    jobs["stiffness"] = lambda: qc.stiffness_matrix(mesh)
+    jobs["stiffness in place"] = lambda: qc.stiffness_matrix(mesh, out=S)
+    jobs["scipy assembly"] = lambda: quad_stiffness(stencils)
+    local = np.ones(16 * len(faces))
+    i, j = np.repeat(faces, 4, axis=1).ravel(), np.tile(faces, (1, 4)).ravel()
+    jobs["scipy coo->csr"] = lambda: scipy.sparse.csr_array((local, (i, j)), shape=S.shape)
+    jobs["igl.cotmatrix"] = lambda: igl.cotmatrix(points, cut)
+    return jobs
+
+
+def of_grids(n: int, threads: int, times: dict[str, Floats]) -> Iterator[Ratio]:
+    """Ratios of the grid table."""
+    asked = n >= 1024 and threads == 2
+    rest: dict[str, Any] = {"vertices": n * n, "threads": threads}
+    for name in times:
+        if "grid" in name:
+            yield ratio(name, "copy", times, True, **rest, **({"must": 2.0, "aim": 1.5} if asked else {}))
+            if "wrapped" in name:
+                yield ratio(name, "numpy", times, False, **rest, **({"must": 25, "aim": 60} if asked else {}))
+
+
+def of_faces(n: int, threads: int, times: dict[str, Floats]) -> Iterator[Ratio]:
+    """Ratios of the face-list table."""
+    rest: dict[str, Any] = {"vertices": n * n, "threads": threads}
+    asked = {
+        "libigl": (35, 80),
+        "VTK": (28, 40),
+        "MeshLab": (50, 90),
+        "robust_laplacian": (np.nan, np.nan),
+        "igl.principal_curvature": (np.nan, np.nan),
+    }
+    for scheme in ("finite_volume", "liu"):
+        natural, shuffled = (f"{scheme}, repeated, {kind}" for kind in ("natural", "shuffled"))
+        for peer, (must, aim) in asked.items():
+            if peer in times:
+                yield ratio(natural, peer, times, False, must=must, aim=aim, **rest)
+        yield ratio(shuffled, natural, times, True, must=3, aim=1.5, **rest)
+    once = "finite_volume, one call, "
+    yield ratio(once + "natural", "libigl", times, False, must=10, aim=20, **rest)
+    yield ratio(once + "shuffled", once + "natural", times, True, **rest)
+    yield ratio("stiffness", "scipy coo->csr", times, False, must=5, aim=6, **rest)
+    yield ratio("stiffness", "scipy assembly", times, False, **rest)
+    yield ratio("stiffness", "igl.cotmatrix", times, False, must=20, aim=30, **rest)
+    yield ratio("stiffness in place", "igl.cotmatrix", times, False, **rest)
+
+
+MEMORY = """
+import resource, sys
+import numpy as np, igl, quadcurv as qc
+from comparisons.performance import face_lists, triangles
+def run(points, faces, cut):
+    if sys.argv[1] == "libigl":
+        return igl.massmatrix(points, cut), igl.cotmatrix(points, cut) @ points
+    mesh = qc.QuadMesh(points, faces)
+    return mesh, qc.mean_curvature_normal(mesh)
+points, faces = face_lists(16)["natural"]
+run(points, faces, triangles(faces))
+points, faces = face_lists(int(sys.argv[2]))["natural"]
+cut = triangles(faces)
+def now():
+    pages = int(open("/proc/self/statm").read().split()[1])
+    return pages * resource.getpagesize()
+before = now()
+open("/proc/self/clear_refs", "w").write("5")
+kept = run(points, faces, cut)
+peak = [int(l.split()[1]) * 1024 for l in open("/proc/self/status") if l.startswith("VmHWM")][0]
+print((peak - before) / len(points))
+"""
+FIRST_CALL = """
+import numpy as np
+import quadcurv
+x, y = np.meshgrid(*[np.linspace(0, 1, 64)] * 2)
+quadcurv.mean_curvature(quadcurv.QuadGrid(np.stack([x, y, x * y], axis=-1)))
+"""
+
+
+def python(code: str, *given: object) -> str:
+    """Run code in a fresh process, in the folder that holds this package."""
+    command = [sys.executable, "-c", code, *map(str, given)]
+    folder = Path(__file__).parents[1]
+    return subprocess.run(command, cwd=folder, capture_output=True, text=True, check=True).stdout
+
+
+def memory(n: int) -> tuple[Ratio, dict[str, float]]:
+    """Peak of memory beyond the mesh, as it is given, of one call: Linux only."""
+    peak = {who: float(python(MEMORY, who, n)) for who in ("finite_volume", "libigl")}
+    share = peak["finite_volume"] / peak["libigl"]
+    name = "peak memory, one call"
+    return Ratio(name, "libigl", n * n, parallel.threads(), share, share, share, 1 / 10, 1 / 15), peak
+
+
+def first_call(count: int) -> Ratio:
+    """Seconds from a bare interpreter to the first mean curvature; compiled code is on disk."""
+    python(FIRST_CALL)
+    seconds = []
+    for _ in range(count):
+        taken = []
+        for code in (FIRST_CALL, "pass"):
+            begin = time.perf_counter()
+            python(code)
+            taken.append(time.perf_counter() - begin)
+        seconds.append(taken[0] - taken[1])
+    low, median, high = np.quantile(seconds, (0.25, 0.5, 0.75))
+    return Ratio("first call, seconds", "bare python", 64 * 64, 1, low, median, high, 1.0, 0.5)
+
+
+def growth(times: Mapping[int, Mapping[str, Floats]]) -> dict[str, float]:
+    """Exponent p of median time = c n^p in the number of vertices, of all that ran at three sizes."""
+    sizes = sorted(times)
+    common = [name for name in times[sizes[0]] if all(name in times[n] for n in sizes)]
+    return {
+        name: float(np.polyfit(np.log(sizes), [np.log(np.median(times[n][name])) for n in sizes], 1)[0])
+        for name in common
+    }
+
+
+def measure(quick: bool) -> tuple[list[Ratio], dict[str, dict[int, dict[str, Floats]]], dict[str, float]]:
+    """All ratios; times of the grid and of the face-list table by size, with all threads; bytes a vertex."""
+    sizes, count = ((128, 256), 3) if quick else (SIZES, 7)
+    times: dict[str, dict[int, dict[str, Floats]]] = {"grids": {}, "faces": {}}
+    ratios: list[Ratio] = []
+    try:
+        for n in sizes:
+            for threads in (1, 2):
+                qc.set_threads(threads)
+                grids, faces = rounds(grid_jobs(n), 3 * count), rounds(face_jobs(n), count)
+                times["grids"][n * n], times["faces"][n * n] = grids, faces
+                ratios += [*of_grids(n, threads, grids), *of_faces(n, threads, faces)]
+        n = sizes[-1] if quick else 1024
+        used, peak = memory(n) if sys.platform == "linux" else (None, {})
+        ratios += [r for r in (used, first_call(3 if quick else 9)) if r]
+    finally:
+        qc.set_threads(None)
+    if not quick:
+        for table in times.values():
+            for name, p in growth(table).items():
+                ours = name.startswith(("finite_volume", "liu", "stiffness"))
+                must, aim = (1.05, 1.0) if ours else (np.nan, np.nan)
+                ratios.append(
+                    Ratio(f"exponent of growth, {name}", "n", sizes[-1] ** 2, 2, p, p, p, must, aim)
+                )
+    return ratios, times, peak
+
+
+def versions() -> str:
+    """Libraries that took part."""
+    found = []
+    for name in PEERS:
+        try:
+            found.append(f"{name} {version(name)}")
+        except PackageNotFoundError:
+            found.append(f"{name} not installed")
+    return ", ".join(found)
+
+
+def markdown(
+    ratios: list[Ratio], times: dict[str, dict[int, dict[str, Floats]]], peak: dict[str, float]
+) -> str:
+    """The report."""
+    counted = operations()
+    lines = [
+        "# Speed",
+        "",
+        "Written by `python -m comparisons.performance`. Median and quartiles, over the rounds, of the ratio of",
+        "two wall times taken in one round of one process; *must* and *aim* are what was set as a goal. "
+        "Validation is",
+        "never left out: *one call* checks the mesh, sorts its corners and evaluates; *repeated* moves the points",
+        "of a mesh (`mesh.with_points(points)`, which checks them) and evaluates.",
+        "A *copy* reads and writes the 24 + 24 bytes a vertex that the mean curvature normal reads and writes,",
+        "on as many threads.",
+        "",
+        f"Python {platform.python_version()}, {os.cpu_count()} cores, {versions()}.",
+        "",
+        f"Floating-point operations a vertex: {counted['all']} "
+        f"({', '.join(f'{n} {name}' for name, n in counted.items() if name != 'all')}); "
+        f"the thesis's implementation took {THESIS_OPERATIONS}.",
+    ]
+    if peak:
+        per = ", ".join(f"{who} {b:.0f}" for who, b in peak.items())
+        lines += ["", f"Peak memory of one call beyond points and faces, bytes a vertex: {per}."]
+    lines += [
+        "",
+        "| what | against | vertices | threads | median | quartiles | must | aim | reached |",
+        "| --- | --- | ---: | ---: | ---: | ---: | ---: | ---: | --- |",
+    ]
+    for r in ratios:
+        goal = ["", ""] if np.isnan(r.must) else [f"{r.must:.3g}", f"{r.aim:.3g}"]
+        cells = [
+            r.name,
+            r.against,
+            str(r.vertices),
+            str(r.threads),
+            f"{r.median:.3g}",
+            f"{r.low:.3g} to {r.high:.3g}",
+            *goal,
+            r.verdict,
+        ]
+        lines.append(f"| {' | '.join(cells)} |")
+    lines += ["", "Nanoseconds a vertex, median, 2 threads:", ""]
+    for table in times.values():
+        sizes = sorted(table)
+        lines.append(f"| | {' | '.join(str(n) for n in sizes)} |")
+        lines.append("| --- |" + " ---: |" * len(sizes))
+        for name in table[sizes[0]]:
+            row = [f"{np.median(table[n][name]) / n * 1e9:.1f}" if name in table[n] else "" for n in sizes]
+            lines.append(f"| {name} | {' | '.join(row)} |")
+        lines.append("")
+    return "\n".join(lines)
+
+
+@paper_style
+def plots(output: Path, ratios: list[Ratio], times: dict[str, dict[int, dict[str, Floats]]]) -> None:
+    """Time a vertex against size, and how often faster than the peers."""
+    fig, (left, right) = figure(1, 2, size=(9.2, 4.2), sharey=True)
+    chosen = {
+        left: ("grids", "grids", ("copy", "finite_volume, wrapped grid", "liu, open grid", "numpy")),
+        right: (
+            "faces",
+            "face lists",
+            (
+                "finite_volume, repeated, natural",
+                "finite_volume, repeated, shuffled",
+                "finite_volume, one call, natural",
+                "libigl",
+                "VTK",
+                "MeshLab",
+                "robust_laplacian",
+            ),
+        ),
+    }
+    for axes, (table, title, names) in chosen.items():
+        by_size = times[table]
+        for i, name in enumerate(names):
+            sizes = np.array([n for n in sorted(by_size) if name in by_size[n]])
+            if sizes.size == 0:
+                continue
+            nanoseconds = [np.median(by_size[n][name]) / n * 1e9 for n in sizes]
+            style = {"color": COLOURS[i % len(COLOURS)], "marker": MARKERS[i % len(MARKERS)]}
+            axes.plot(
+                sizes, nanoseconds, label=name.replace("finite_volume", "FV").replace("liu", "Liu"), **style
+            )
+        axes.set(xscale="log", yscale="log", xlabel="vertices", title=title)
+        axes.legend(fontsize=7)
+    left.set_ylabel("time per vertex (ns)")
+    save_figure(fig, output, "performance-time")
+
+    # A goal for each in the largest size that it is asked of.
+    goals = {(r.name, r.against): r for r in ratios if not np.isnan(r.must) and "growth" not in r.name}
+    fig, axes = figure(size=(7.2, 0.32 * len(goals) + 1.2))
+    for i, r in enumerate(goals.values()):
+        sign = 1 if r.must <= r.aim else -1
+        share = [(x / r.must) ** sign for x in (r.low, r.median, r.high, r.aim)]
+        axes.plot(sorted([share[0], share[2]]), [i, i], color=COLOURS[0])
+        axes.plot(share[1], i, "o", color=COLOURS[0], label="measured, quartiles" if i == 0 else None)
+        axes.plot(share[3], i, "|", color=COLOURS[1], markersize=10, label="aim" if i == 0 else None)
+    axes.axvline(1, color=COLOURS[6], linewidth=0.9, label="must")
+    labels = [f"{r.name} / {r.against}".replace("finite_volume", "FV") for r in goals.values()]
+    axes.set(
+        xscale="log", xlabel="times better than it must be", yticks=range(len(goals)), yticklabels=labels
+    )
+    axes.invert_yaxis()
+    axes.legend(fontsize=7)
+    save_figure(fig, output, "performance-goals")
+
+
+def main(output: Path, quick: bool = False) -> dict[str, Any]:
+    """Measure, and write the report and the figures.
+
+    Parameters
+    ----------
+    output : path
+        Folder for figures, and for the report of a quick run.
+    quick : bool
+        Small meshes and few rounds, in which no ratio means much.
+
+    Returns
+    -------
+    dict
+        "ratios": list of Ratio. "operations": as from :func:`operations`. "report": path of the report.
+    """
+    ratios, times, peak = measure(quick)
+    output.mkdir(parents=True, exist_ok=True)
+    report = output / REPORT.name if quick else REPORT
+    report.write_text(markdown(ratios, times, peak))
+    plots(output, ratios, times)
+    return {"ratios": ratios, "operations": operations(), "report": report}
+
+
+if __name__ == "__main__":
+    given = arguments(__doc__)
+    found = main(given.output, given.quick)
+    print(found["report"].read_text())
