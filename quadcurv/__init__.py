@@ -1,6 +1,6 @@
 """Mean curvature on quad meshes and logically Cartesian grids, with every operator side by side."""
 
-from quadcurv.boundary import stencils
+from quadcurv.boundary import boundary_treatment, stencils
 from quadcurv.convert import as_grid, duplicate_points, merge_points, pair_triangles
 from quadcurv.curvature import (
     dual_areas,
@@ -33,6 +33,7 @@ __all__ = [
     "as_grid",
     "as_mesh",
     "attach",
+    "boundary_treatment",
     "dual_areas",
     "duplicate_points",
     "evaluate",

@@ -126,6 +126,8 @@ def alexa_wardetzky(stabilisation: float = 1.0) -> Scheme:
         flat = edge - np.einsum("mkx,mx,my->mky", edge, normal, normal)
         middle = middle - x.mean(axis=1, keepdims=True)
         metric = np.swapaxes(flat, 1, 2) @ flat + np.einsum("m,mx,my->mxy", area, normal, normal)
+        # Diagonals in parallel but for rounding: the quad has no plane.
+        metric[~(area > 1e-14 * np.einsum("mkx,mkx->m", edge, edge))] = np.nan
         span = flat @ np.linalg.inv(metric) @ np.swapaxes(flat, 1, 2)  # onto what the projected edges span
         rest = np.eye(x.shape[1]) - span
         inner = middle @ np.swapaxes(middle, 1, 2) / area[:, None, None]
