@@ -24,6 +24,8 @@ from quadcurv.compare import Convergence, compare, convergence
 from quadcurv.mesh import Stencils
 from quadcurv.schemes import SCHEMES, cotan
 from quadcurv.schemes.cotan import cotan_matrices
+from quadcurv.schemes.finite_volume import FINITE_VOLUME
+from quadcurv.schemes.liu import LIU
 
 Results = dict[str, float]
 
@@ -80,13 +82,15 @@ def _stencil(axes: Axes, ring: np.ndarray, title: str) -> None:
     axes.plot(*polygon.T, color=COLOURS[0], label="edges $t_2 = b - a$ of the dual cell")
     for k, d in enumerate(primal):
         label = "$t_1 = d - c$, crossing an edge" if k == 0 else None
-        axes.annotate("", d, (0, 0), arrowprops={"arrowstyle": "->", "color": COLOURS[1], "shrinkB": 5})
+        axes.annotate(
+            "", tuple(d), (0, 0), arrowprops={"arrowstyle": "->", "color": COLOURS[1], "shrinkB": 5}
+        )
         axes.plot([], [], color=COLOURS[1], label=label)
     axes.plot(*dual.T, "s", color=COLOURS[0], label="$a$, $b$: dual points")
     axes.plot(*primal.T, "o", color=COLOURS[1], label="$d$: primal points")
     axes.plot(0, 0, "o", color="black", label="$c$: the point in question")
     for point, name in ((dual[0], "$a$"), (primal[0], "$d$"), (dual[1], "$b$"), (np.zeros(2), "$c$")):
-        axes.annotate(name, point, (6, 5), textcoords="offset points", fontsize=11)
+        axes.annotate(name, tuple(point), (6, 5), textcoords="offset points", fontsize=11)
     axes.set(title=title, aspect="equal", xlim=(-1.6, 1.6), ylim=(-1.6, 1.6), xticks=[], yticks=[])
     axes.spines[:].set_visible(False)
     axes.grid(False)
@@ -146,8 +150,8 @@ def fluxes_differ(n: int = 24) -> float:
     mesh, *_ = surfaces.torus().sample((n, n))
     noise = np.random.default_rng(0).normal(0, 0.02, mesh.points.shape)
     stencils = type(mesh)(mesh.points + noise, mesh.wrap).stencils()
-    flux = {name: SCHEMES[name].apply(stencils)[0] for name in ("finite_volume", "liu")}
-    return float(np.abs(flux["finite_volume"] - flux["liu"]).max() / np.abs(flux["liu"]).max())
+    fv, liu = (scheme.apply(stencils)[0] for scheme in (FINITE_VOLUME, LIU))
+    return float(np.abs(fv - liu).max() / np.abs(liu).max())
 
 
 def factor_of_4_1(n: int = 32) -> float:

@@ -83,12 +83,13 @@ class Field:
         return list(zip(places.tolist(), labels, strict=True))
 
     def text(self, value: float) -> str:
-        """Value as coloured, in words: the number itself, "0" or "undefined"."""
+        """What a coloured value stands for: a number, "undefined", or the end of a scale of decades."""
         if np.isnan(value):
             return "undefined"
         if self.shows_zero and value < self.limits[0]:
             return "0"
-        return f"{10**value if self.logarithmic else value:.4g}".replace("-", "−")
+        number = f"{10 ** max(value, self.limits[0]) if self.logarithmic else value:.4g}".replace("-", "−")
+        return f"≤ {number}" if self.logarithmic and value <= self.limits[0] else number
 
 
 @functools.lru_cache(maxsize=2)

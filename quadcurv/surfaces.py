@@ -11,11 +11,11 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+import scipy
 from numpy.typing import ArrayLike, NDArray
-from scipy import sparse
 from scipy.spatial import cKDTree
 
-from quadcurv.mesh import Mesh, QuadGrid, QuadMesh, StaggeredGrid, grid_faces
+from quadcurv.mesh import QuadGrid, QuadMesh, StaggeredGrid, grid_faces
 
 __all__ = [
     "SURFACES",
@@ -95,7 +95,7 @@ class Surface:
     panels: tuple[float, ...] = (0.0,)
     singular_points: tuple[tuple[float, float], ...] = ()
 
-    def sample(self, shape: tuple[int, int], layout: str = "grid") -> tuple[Mesh, Array, Array]:
+    def sample(self, shape: tuple[int, int], layout: str = "grid") -> tuple[Any, Array, Array]:
         """Mesh of evenly spaced parameters.
 
         Parameters
@@ -130,8 +130,8 @@ class Surface:
             dual = [
                 a + (b - a) / n * np.arange(-1, n + 2) for (a, b), n in zip(self.domain, shape, strict=True)
             ]
-            centre = ((d[1:-2] + d[2:-1]) / 2 for d in dual)
-            return StaggeredGrid.from_mapping(self.mapping, *dual), *np.meshgrid(*centre, indexing="ij")
+            xi, eta = np.meshgrid(*((d[1:-2] + d[2:-1]) / 2 for d in dual), indexing="ij")
+            return StaggeredGrid.from_mapping(self.mapping, *dual), xi, eta
         ends = [
             np.linspace(a, b, n if wraps else n + 1, endpoint=not wraps)
             for (a, b), n, wraps in zip(self.domain, shape, self.wrap, strict=True)
@@ -149,8 +149,8 @@ class Surface:
         index = np.arange(len(points), dtype=np.int32).reshape(xi.shape)
         faces = np.concatenate([grid_faces(panel) for panel in index])
         pairs = cKDTree(points).query_pairs(1e-9 * np.ptp(points, axis=0).max(), output_type="ndarray")
-        same = sparse.coo_array((np.ones(len(pairs)), tuple(pairs.T)), shape=(len(points),) * 2)
-        label = sparse.csgraph.connected_components(same, directed=False)[1]
+        same = scipy.sparse.coo_array((np.ones(len(pairs)), tuple(pairs.T)), shape=(len(points),) * 2)
+        label = scipy.sparse.csgraph.connected_components(same, directed=False)[1]
         # Labels come in the order of first appearance, so the first vertex of each is kept.
         first = np.unique(label, return_index=True)[1]
         return QuadMesh(points[first], label[faces]), xi.ravel()[first], eta.ravel()[first]

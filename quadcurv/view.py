@@ -24,7 +24,7 @@ from quadcurv.page import save_page
 if TYPE_CHECKING:
     import pyvista as pv
 
-PANEL, LEGEND, CONTROLS = 400, 120, 70  # pixels: side of a view, heights of the rows below
+PANEL, LEGEND, CONTROLS = 400, 120, 95  # pixels: side of a view, heights of the rows below
 SCREEN = 1600, 800  # pixels that the views of a window may take
 VALUES = "values"  # name of the coloured array
 _SCALE = 1.5  # pixels of a picture to one of a window
@@ -389,6 +389,10 @@ class View:
             render=False,
             **style,
         )
+        actor.mapper.SetResolveCoincidentTopologyToPolygonOffset()  # before the surface it lies in
+        for offset in ("Line", "Polygon"):
+            getattr(actor.mapper, f"SetRelativeCoincidentTopology{offset}OffsetParameters")(-2.0, -2.0)
+        actor.mapper.SetRelativeCoincidentTopologyPointOffsetParameter(-20.0)
         self._drawn.setdefault(what, []).append((self.plotter.renderer, actor))
 
     def _clear(self, what: str) -> None:
@@ -466,12 +470,13 @@ class View:
             self._draw("picked", ring, style="wireframe", color=RING_COLOUR, line_width=4 * self._scale)
             dot = pv.PolyData(self._sites[[self.picked]])
             self._draw("picked", dot, color="black", point_size=9 * self._scale)
-        what = ""
-        if self.picked is not None:
-            kind = "cell" if self._on_cells else "vertex"
-            what = f"{kind} {self.picked}, valence {self.comparison.valence.ravel()[self.picked]}"
-        self.plotter.subplot(self._rows, 0)
-        self._text(what, (0.02, 0.82), 10, name="picked", align="left")
+        if not self.plotter.off_screen:
+            what = "click on the surface for values"
+            if self.picked is not None:
+                kind = "cell" if self._on_cells else "vertex"
+                what = f"{kind} {self.picked}, valence {self.comparison.valence.ravel()[self.picked]}"
+            self.plotter.subplot(self._rows + 1, 0)
+            self._text(what, (0.5, 0.85), 9 / self._scale, name="picked")
 
     def _add_legend(self) -> None:
         """Colour bar with title above and labels below, and patches of all colours beyond it."""
@@ -513,15 +518,8 @@ class View:
         actor.SetMapper(mapper)
         self.plotter.renderer.AddViewProp(actor)
 
-    def _text(
-        self,
-        text: str,
-        position: tuple[float, float],
-        size: float,
-        name: str | None = None,
-        align: str = "center",
-    ) -> None:
-        """Text at a position of the current view, in coordinates from 0 to 1."""
+    def _text(self, text: str, position: tuple[float, float], size: float, name: str | None = None) -> None:
+        """Text centred at a position of the current view, in coordinates from 0 to 1."""
         import matplotlib as mpl
 
         actor = self.plotter.add_text(
@@ -534,7 +532,7 @@ class View:
             name=name,
             render=False,
         )
-        actor.prop.justification_horizontal = align
+        actor.prop.justification_horizontal = "center"
         actor.prop.justification_vertical = "center"
 
     def _add_controls(self) -> None:
@@ -559,7 +557,7 @@ class View:
                 color_off="#0072b2",
                 background_color="black",
             )
-            self._text(label, ((x + 13) / width, 0.2), 6 / self._scale)
+            self._text(label, ((x + 13) / width, 0.15), 6 / self._scale)
             plotter.add_key_event(key, action)
         plotter.add_key_event("Left", lambda: self.next_field(-1))
         if self._refined is not None:
@@ -567,12 +565,12 @@ class View:
                 self.refine,
                 rng=(0, self.LEVELS - 1),
                 value=self.START,
-                pointa=(0.72, 0.55),
-                pointb=(0.97, 0.55),
+                pointa=(0.72, 0.42),
+                pointb=(0.97, 0.42),
                 fmt="%.0f",
                 color="#0072b2",
-                slider_width=0.045,
-                tube_width=0.025,
+                slider_width=0.1,
+                tube_width=0.02,
             )
             self._text(f"refinement {self._level}", (0.845, 0.12), 6 / self._scale, name="refinement")
         pressed: list[tuple[int, int]] = []

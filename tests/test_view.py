@@ -82,6 +82,7 @@ def test_errors_span_six_decades_and_smaller_ones_take_the_lowest_colour():
     assert shown.limits == (-7, -1)
     assert shown.values["a"].min() == -7
     assert shown.ticks()[0][1] == "≤ 1e-7"
+    assert [shown.text(v) for v in shown.values["a"][2:]] == ["1e−05", "≤ 1e−07", "≤ 1e−07", "≤ 1e−07"]
     assert shown.patches() == []
 
 
@@ -482,7 +483,8 @@ def test_page_of_cells(browser, pillow, tmp_path):
     kind, cell, *_ = page.text("#picked").replace(",", "").split()
     assert kind == "cell"
     name, value = page.text("#views > div").split(": ")
-    assert float(value) == pytest.approx(abs(pillow.errors[name].ravel()[int(cell)]), rel=1e-3)
+    expected = abs(pillow.errors[name].ravel()[int(cell)])
+    assert float(value) == pytest.approx(expected, rel=1e-3)
 
 
 def test_page_marks_boundaries_and_what_is_undefined(browser, tmp_path):
@@ -564,8 +566,8 @@ def ended(process):
 class Window:
     """A window on a screen of its own, used by mouse and keyboard."""
 
-    def __init__(self, screen, state):
-        self.screen, self.path = screen, state
+    def __init__(self, screen, folder):
+        self.screen, self.path, self.log = screen, folder / "state.json", folder / "log.txt"
 
     def do(self, *actions):
         subprocess.run(["xdotool", *map(str, actions)], env=os.environ | {"DISPLAY": self.screen}, check=True)
@@ -577,12 +579,13 @@ class Window:
 
     def becomes(self, **expected):
         """Wait until the window shows what is expected."""
-        until = time.monotonic() + 20
+        until = time.monotonic() + 60
         while time.monotonic() < until:
             if self.path.exists() and expected.items() <= self.state.items():
                 return self.state
             time.sleep(0.05)
-        raise AssertionError(f"expected {expected}, the window shows {self.state}")
+        found = self.path.read_text() if self.path.exists() else self.log.read_text()
+        raise AssertionError(f"expected {expected}, the window shows {found}")
 
     def click(self, x, y):
         self.do("mousemove", x, y)
@@ -600,9 +603,6 @@ class Window:
         return np.asarray(ImageGrab.grab(xdisplay=self.screen).convert("RGB"), float)
 
 
-SILENT = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
-
-
 @pytest.fixture
 def screen():
     """Display of a screen of its own."""
@@ -611,7 +611,7 @@ def screen():
             pytest.skip(f"not installed: {program}")
     read, write = os.pipe()
     command = ["Xvfb", "-displayfd", str(write), "-screen", "0", "1700x700x24", "-nolisten", "tcp"]
-    server = subprocess.Popen(command, pass_fds=[write], **SILENT)
+    server = subprocess.Popen(command, pass_fds=[write], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
     os.close(write)
     with ended(server), os.fdopen(read) as pipe:
         yield f":{pipe.readline().strip()}"
@@ -619,12 +619,13 @@ def screen():
 
 @pytest.fixture
 def window(screen, tmp_path):
-    state = tmp_path / "state.json"
-    child = subprocess.Popen(
-        [sys.executable, "-c", WINDOW, str(state)], env=os.environ | {"DISPLAY": screen}, **SILENT
-    )
-    with ended(child):
-        found = Window(screen, state)
+    found = Window(screen, tmp_path)
+    command = [sys.executable, "-c", WINDOW, str(found.path)]
+    with (
+        found.log.open("w") as log,
+        subprocess.Popen(command, env=os.environ | {"DISPLAY": screen}, stdout=log, stderr=log) as child,
+        ended(child),
+    ):
         found.becomes(vertices=256)
         found.do("search", "--sync", "--name", "quadcurv", "windowfocus")
         yield found
@@ -636,7 +637,7 @@ def test_keys_and_buttons(window):
     window.becomes(field="error")
     window.do("key", "Left")
     window.becomes(field="mean_curvature")
-    window.click(48, 548)  # the button "next field"
+    window.click(48, 572)  # the button "next field"
     window.becomes(field="error")
     for key, what in (("o", "overlays"), ("n", "normals"), ("d", "directions")):
         window.do("key", key)
@@ -698,7 +699,7 @@ def test_picking_shows_the_ring_in_both_views(window):
 def test_the_slider_refines(window):
     window.do("key", "o")
     window.becomes(shown=["edges", "overlays"])
-    window.drag((656, 551), (776, 551))
+    window.drag((656, 575), (776, 575))
     state = window.becomes(vertices=128**2)
     assert state["shown"] == ["edges", "overlays"]
     assert state["picked"] is None
