@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from math import comb
+from typing import NamedTuple
 
 import numpy as np
 import scipy
@@ -73,7 +74,8 @@ def stencils(mesh: Mesh, boundary: str = "extrapolate") -> Stencils:
     if boundary == "nan":
         return mesh.stencils()
     if isinstance(mesh, QuadMesh):
-        return ghosted_faces(mesh.stencils())
+        given = mesh.stencils()
+        return with_ghosts(given, ghosts(given))[0]
     if isinstance(mesh, QuadGrid):
         return _ghosted_grid(mesh)
     if mesh.has_ghosts:
@@ -130,7 +132,7 @@ def roughness(mesh: Mesh) -> Floats:
         if mesh.has_ghosts:
             return np.zeros(mesh.shape)
         mesh = QuadGrid(mesh.primal, mesh.wrap)
-    ghosted, rough = _ghosted_faces(mesh.stencils())
+    ghosted, rough = _roughness(mesh.stencils())
     return rough.reshape(ghosted.shape)
 
 
@@ -262,20 +264,36 @@ def _ghosted_cells(grid: StaggeredGrid) -> Stencils:
     return grid.diamonds(index, ghosts)
 
 
-def ghosted_faces(mesh: Stencils) -> Stencils:
-    """Stencils of a face list with its ghost quads, see :func:`stencils`."""
-    return _ghosted_faces(mesh)[0]
+class Ghosts(NamedTuple):
+    """The ghost layer of a face list, as far as its connectivity settles it.
+
+    Attributes
+    ----------
+    lines : (g, DEGREE + 1) int64
+        The vertices that each ghost beside an edge is extrapolated from.
+    across : (2 h, DEGREE + 1) int64
+        The ghosts of two sides that each ghost across a corner is the mean extrapolation of.
+    quads : (k, 4) int32
+        Ghost quads over the n vertices, the g ghosts and the h across corners.
+    closed : (n,) bool
+        Whether the ring is closed with them.
+    """
+
+    lines: Indices
+    across: Indices
+    quads: NDArray[np.int32]
+    closed: Bools
 
 
-def _ghosted_faces(mesh: Stencils) -> tuple[Stencils, Floats]:
-    """Stencils with a ghost quad beyond every boundary edge whose strip is long enough; roughness (n,)."""
-    n, points = mesh.n, mesh.points
+def ghosts(mesh: Stencils) -> Ghosts:
+    """Find a ghost quad beyond every boundary edge whose strip is long enough, see :func:`stencils`."""
+    n = mesh.n
     rails, slot, valence, n_edges = _strips(mesh)
     if len(rails) == 0:
-        return mesh, np.where(mesh.closed, 0.0, np.nan)
+        none = np.empty((0, DEGREE + 1), np.int64)
+        return Ghosts(none, none, np.empty((0, 4), np.int32), mesh.closed)
     # One ghost for each rail X_0, X_1, ...: at a side the strips to the left and right share it.
     _, first, ghost = np.unique(rails[:, 0] * n + rails[:, 1], return_index=True, return_inverse=True)
-    ghosts, rough = _extrapolated(points[rails[first]])
     quads = np.concatenate((n + ghost.reshape(-1, 2), rails[:, 0].reshape(-1, 2)[:, ::-1]), axis=1)
 
     both = np.bincount(rails[:, 0], minlength=n) == 2
@@ -287,29 +305,36 @@ def _ghosted_faces(mesh: Stencils) -> tuple[Stencils, Floats]:
     beyond, known = _beside(rails, ghost, rails[at], n)
     known = known[::2] & known[1::2]
     beyond, (begin, end) = beyond[np.repeat(known, 2)], at.reshape(-1, 2)[known].T
-    across, rough_across = _extrapolated(ghosts[beyond])
     c = rails[begin, 0]
-    number = n + len(ghosts) + np.arange(c.size)
+    number = n + len(first) + np.arange(c.size)
     corner_quads = np.stack((number, n + ghost[begin], c, n + ghost[end]), axis=1)
-    quads = np.concatenate((quads, corner_quads), dtype=np.int32)
-
-    closed = mesh.closed | side
-    closed[c] = True
-    rough = np.concatenate((np.zeros(n), rough, np.maximum(rough_across[::2], rough_across[1::2])))
-    worst = np.zeros(rough.size)
-    np.maximum.at(worst, quads, rough[quads].max(axis=1, keepdims=True))
-    roughness = np.where(closed & np.isfinite(worst[:n]), worst[:n], np.nan)
-
     # Each begins where its face does, moved outward: a fixed diagonal goes on in the ghosts.
+    quads = np.concatenate((quads, corner_quads), dtype=np.int32)
     first_slot = np.concatenate((slot, slot[begin // 2]))
     quads = np.take_along_axis(quads, (np.arange(4) - first_slot[:, None]) % 4, axis=1)
-    return Stencils(
-        np.concatenate((points, ghosts, (across[::2] + across[1::2]) / 2)),
-        np.concatenate((mesh.faces, quads)),
-        mesh.shape,
-        closed,
-        mesh.orientable,
-    ), roughness
+    closed = mesh.closed | side
+    closed[c] = True
+    return Ghosts(rails[first], beyond, quads, closed)
+
+
+def with_ghosts(mesh: Stencils, layer: Ghosts) -> tuple[Stencils, Floats]:
+    """Stencils with the ghost layer at its positions; how rough the extrapolation is (p,), 0 inside."""
+    beside, rough = _extrapolated(mesh.points[layer.lines])
+    across, rough_across = _extrapolated(beside[layer.across])
+    points = np.concatenate((mesh.points, beside, (across[::2] + across[1::2]) / 2))
+    faces = np.concatenate((mesh.faces, layer.quads))
+    rough = np.concatenate((np.zeros(mesh.n), rough, np.maximum(rough_across[::2], rough_across[1::2])))
+    return Stencils(points, faces, mesh.shape, layer.closed, mesh.orientable), rough
+
+
+def _roughness(mesh: Stencils) -> tuple[Stencils, Floats]:
+    """Stencils with the ghost layer; the worst roughness of the ghost quads at each vertex (n,)."""
+    layer = ghosts(mesh)
+    treated, rough = with_ghosts(mesh, layer)
+    worst = np.zeros(rough.size)
+    np.maximum.at(worst, layer.quads, rough[layer.quads].max(axis=1, keepdims=True))
+    worst = worst[: mesh.n]
+    return treated, np.where(layer.closed & np.isfinite(worst), worst, np.nan)
 
 
 def _extrapolated(lines: Floats) -> tuple[Floats, Floats]:

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import scipy
 
-from quadcurv.boundary import BOUNDARIES, frame, ghosted_faces
+from quadcurv.boundary import BOUNDARIES, frame, ghosts, with_ghosts
 from quadcurv.boundary import stencils as with_boundary
 from quadcurv.interop import as_mesh
 from quadcurv.mesh import Floats, QuadGrid, QuadMesh, StaggeredGrid, Stencils
@@ -198,10 +198,11 @@ def stiffness_matrix(
     Returns
     -------
     (n, n) csr_array
-        Rows sum to zero; natural boundary conditions, no ghosts. Symmetric positive semi-definite but
-        for cotan of valence 4 and 8, and for finite_volume where there are triangles. On quads the
-        finite-volume and Liu's matrix (they are the same) do not see a checkerboard: where vertices can
-        be coloured like a chessboard, the alternating mode lies in the null space beside the constants.
+        Rows sum to zero; natural boundary conditions, no ghosts; NaN at the vertices of a face without
+        area. Symmetric positive semi-definite but for cotan of valence 4 and 8, and for finite_volume
+        where there are triangles. On quads the finite-volume and Liu's matrix (they are the same) do not
+        see a checkerboard: where vertices can be coloured like a chessboard, the alternating mode lies in
+        the null space beside the constants.
         Of a staggered grid (n, p): rows are the n cells, columns the p points of ``stencils().points``.
 
     Raises
@@ -211,10 +212,15 @@ def stiffness_matrix(
     """
     scheme, stencils = _as_laplacian(scheme), as_mesh(mesh).stencils()
     if scheme.stiffness is not None:
-        return scheme.stiffness(stencils, out)
-    if out is not None:
+        stiffness = scheme.stiffness(stencils, out)
+    elif out is not None:
         raise ValueError(f"out: {scheme.name} assembles a new matrix each time")
-    return scheme.assemble(stencils)[0]
+    else:
+        stiffness = scheme.assemble(stencils)[0]
+    with np.errstate(invalid="ignore"):
+        if not np.isfinite(stiffness.data.sum()):
+            stiffness.data[~np.isfinite(stiffness.data)] = np.nan
+    return stiffness
 
 
 def mass_matrix(mesh: Any, scheme: str | Scheme | Fit = "finite_volume") -> scipy.sparse.dia_array:
@@ -240,7 +246,7 @@ def mass_matrix(mesh: Any, scheme: str | Scheme | Fit = "finite_volume") -> scip
 def evaluate(
     mesh: Any,
     *wanted: str,
-    scheme: str | Scheme = "finite_volume",
+    scheme: str | Scheme | Fit = "finite_volume",
     boundary: str = "extrapolate",
     out: Mapping[str, Floats] | None = None,
 ) -> dict[str, Floats]:
@@ -320,7 +326,9 @@ def _evaluate_faces(mesh: QuadMesh, scheme: Scheme, boundary: str, results: dict
     others, part = mesh.others()
     if others.size:
         inner = {name: np.empty(part.shape + _PER_VERTEX[name]) for name in results}
-        treated = part if boundary == "nan" else ghosted_faces(part)
+        treated = part
+        if boundary == "extrapolate":
+            treated = with_ghosts(part, mesh.remember("ghosts", lambda: ghosts(part)))[0]
         _evaluate_stencils(part, treated, scheme, inner)
         for name, values in inner.items():
             results[name][others] = values[: others.size]

@@ -390,6 +390,12 @@ class QuadMesh:
 
         return interop.to_pymeshlab(self)
 
+    def remember(self, name: str, make: Callable[[], Any]) -> Any:
+        """Return what depends on the connectivity alone, made once for all meshes that share it."""
+        if name not in self._shared:
+            self._shared[name] = make()
+        return self._shared[name]
+
     def ring_order(self) -> tuple[Ints | None, Ints]:
         """Rings (n, 8) of the regular vertices inside, first -1 for all others; and an order of them.
 
@@ -419,9 +425,9 @@ class QuadMesh:
 
         if self._others.size == 0:
             return self._others, Stencils(self.points[:0], self.faces[:0], (0,), np.empty(0, bool))
-        if "part" not in self._shared:
-            self._shared["part"] = topology.part_around(self.faces, self._others, len(self.points), 4)
-        vertices, faces = self._shared["part"]
+        vertices, faces = self.remember(
+            "part", lambda: topology.part_around(self.faces, self._others, len(self.points), 4)
+        )
         closed = self._kind[vertices] == topology.INTERIOR
         return self._others, Stencils(self.points[vertices], faces, (vertices.size,), closed, self.orientable)
 
@@ -743,7 +749,7 @@ def _checked_wrap(wrap: Sequence[bool]) -> tuple[bool, bool]:
 
 
 def _checked_faces(faces: Any, points: Floats) -> tuple[Ints, NDArray[np.int64] | None, int]:
-    """Faces as (m, 4) int32, the given face each stems from unless it is the same, and how many were split."""
+    """Faces as (m, 4) int32, the given face each stems from (None: itself), and how many were split."""
     from quadcurv.kernels import topology
 
     if len(points) == 0:
@@ -758,7 +764,7 @@ def _checked_faces(faces: Any, points: Floats) -> tuple[Ints, NDArray[np.int64] 
         if given.dtype == np.uint64:  # the largest must not come out as -1
             given = np.minimum(given, np.uint64(np.iinfo(np.int64).max))
         table = np.ascontiguousarray(given, np.int32 if given.dtype == np.int32 else np.int64).view()
-        source, n_split = range(len(given)), 0
+        source, n_split = None, 0
     elif given.ndim == 2 and given.shape[1] in (3, 4):
         raise MeshError(f"faces: expected integer indices, got dtype {given.dtype}")
     else:
@@ -771,17 +777,21 @@ def _checked_faces(faces: Any, points: Floats) -> tuple[Ints, NDArray[np.int64] 
     table.flags.writeable = False  # of one type for the compiler, whatever the caller's is
     checked = np.empty((len(table), 4), np.int32)
     (outside, n_outside), (repeated, n_repeated) = topology.checked(table, n, checked)
+
+    def given_face(face: int) -> int:
+        return face if source is None else int(source[face])
+
     if n_outside:
         raise MeshError(
             f"faces: {n_outside} face(s) with an index outside 0..{n - 1}, "
-            f"first face {source[outside]}: {_padded(table[outside])}"
+            f"first face {given_face(outside)}: {_padded(table[outside])}"
         )
     if n_repeated:
         raise MeshError(
-            f"faces: {n_repeated} face(s) with a repeated vertex, first face {source[repeated]}: "
-            f"{_padded(table[repeated])}"
+            f"faces: {n_repeated} face(s) with a repeated vertex, "
+            f"first face {given_face(repeated)}: {_padded(table[repeated])}"
         )
-    return checked, source if n_split else None, n_split
+    return checked, source, n_split
 
 
 def _padded(face: Any) -> list[int]:

@@ -18,10 +18,11 @@ _B = np.array([[-1.0, 0.0, 1.0, 0.0], [0.0, -1.0, 0.0, 1.0]])
 
 
 def local_stiffness(points: Floats, quads: Ints) -> Floats:
-    """(m, 4, 4) stiffness of each quad."""
+    """(m, 4, 4) stiffness of each quad, not finite for one without area."""
     from quadcurv.kernels import diamond
 
-    return np.einsum("ai,mab,bj->mij", _B, diamond.conductances(points, quads), _B, optimize=True)
+    with np.errstate(invalid="ignore"):
+        return np.einsum("ai,mab,bj->mij", _B, diamond.conductances(points, quads), _B, optimize=True)
 
 
 def scatter(local: Floats, rows: Ints, columns: Ints, shape: tuple[int, int]) -> scipy.sparse.csr_array:
@@ -95,11 +96,10 @@ def write(mesh: Mesh, frame: Frame | None, results: dict[str, Floats], *, liu: i
     else:
         dual = mesh.dual
         for axis in (0, 1):
-            first, last = (dual.take(i, axis) for i in (0, -1))
+            first, last = np.moveaxis(dual, axis, 0)[[0, -1]]
             if mesh.wrap[axis] and not np.array_equal(first, last):  # the seam is that of the first
-                dual = np.concatenate(
-                    (dual.take(range(mesh.shape[axis]), axis), first[None].swapaxes(0, axis)), axis
-                )
+                dual = dual.copy()
+                np.moveaxis(dual, axis, 0)[-1] = first
         points = mesh.primal.reshape(len(mesh.primal), -1)
         halo = int(mesh.has_ghosts)
         kernel = partial(diamond.cells, points, *frame, halo, dual.reshape(r + 1, -1), liu, *wanted)
