@@ -158,6 +158,7 @@ SMOOTH = [
     ("hyperboloid", "grid", (64, 128, 256), 3.7, 1e-6),
     ("torus", "grid", (96, 192, 384), 3.7, 6e-6),
     ("cubed_sphere", "faces", (16, 32, 64), 3.7, 3e-6),
+    ("pillow_sphere", "faces", (16, 32, 64), 3.7, 2e-3),
     ("cubed_ellipsoid", "faces", (16, 32, 64), 2.8, 8e-5),
 ]
 
@@ -306,6 +307,24 @@ def test_other_borders_are_second_order_at_least(name, layout):
         errors.append(np.abs(qc.mean_curvature(mesh, "jet") - exact.reshape(mesh.stencils().shape)).max())
     assert errors[-1] < 2e-3
     assert fitted_rate((32, 64, 128), errors) > 2
+
+
+@pytest.mark.parametrize("name", ["elliptic_paraboloid", "tanh_sheet", "hyperboloid", "pillow_sphere"])
+def test_staggered_grids(name):
+    """Centres and corners together; with ghost cells as good at the border, without them third-order."""
+    surface = surfaces.SURFACES[name]()
+    given, without = [], []
+    for n in (16, 32, 64):
+        grid, xi, eta = surface.sample((n, n), "staggered")
+        exact = surface.mean_curvature(xi, eta)
+        given.append(np.abs(qc.mean_curvature(grid, "jet") - exact).max())
+        bare = qc.StaggeredGrid(grid.primal[1:-1, 1:-1], grid.dual)
+        without.append(np.abs(qc.mean_curvature(bare, "jet") - exact).max())
+        assert np.isnan(qc.mean_curvature(bare, "jet", boundary="nan")).sum() == 4 * n - 4
+    assert given[-1] < 3e-4
+    assert without[-1] < 5e-4
+    assert fitted_rate((16, 32, 64), given) > 3.7
+    assert fitted_rate((16, 32, 64), without) > 2.8
 
 
 def test_circular_border_of_a_disc():

@@ -12,8 +12,9 @@ from quadcurv.boundary import BOUNDARIES, ghost_layer
 from quadcurv.mesh import Bools, Floats, Ints, Mesh, QuadGrid, QuadMesh
 from quadcurv.schemes.base import Curvatures, Fit, StandardErrors
 
-# Least part of a term's square that the terms eliminated before it may leave: 1e-2 on a lattice as on any
-# sound neighbourhood, nothing where a term is a combination of the others.
+# Most that errors in height, of unit mean square, may grow to in the second derivatives, both in units of
+# the neighbourhood's extent: inside 2, 3 and 10 by degree; at the sides of a grid, where rings beyond the
+# least are needed, 5, 30 and 100.
 _CONDITION = {2: 20.0, 3: 60.0, 4: 220.0}
 _GROWTH = 3
 _GHOST_DEGREE, _GHOST_LAYERS = 5, 2
@@ -50,7 +51,8 @@ def jet(degree: int | Literal["auto"] = 4, rings: int | None = None) -> Fit:
     Returns
     -------
     Fit
-        Curvature of order `degree` on smooth meshes of even degree, `degree` - 1 on irregular ones.
+        H of order 4 with degree 4 and of order 2 with the others where neighbourhoods are nearly symmetric,
+        of order `degree` - 1 elsewhere.
         Where the vertices of the rings do not determine the polynomial well, up to three more rings
         are taken, and if that does not help the degree is lowered; ``Curvatures.degree`` and ``.rings``
         report it. With boundary="extrapolate" the open sides of a smooth grid get as many ghost layers as
@@ -115,6 +117,8 @@ def _choice(vertices: NDArray[np.int64], run: Run) -> tuple[int, int]:
     """
     from quadcurv.kernels import jet as kernel
 
+    if vertices.size < _LEAST_SAMPLE:
+        return _CANDIDATES[0]
     if vertices.size > _SAMPLE:
         vertices = np.random.default_rng(0).choice(vertices, _SAMPLE, replace=False)
     fits = {(d, r): run(vertices, d, r) for d, r in _CANDIDATES}
@@ -245,6 +249,12 @@ def _on_faces(mesh: Mesh) -> tuple[Bools, Run]:
     wanted = np.ones(stencils.n, bool)
     if isinstance(mesh, QuadMesh):
         wanted = (mesh._kind == topology.INTERIOR) | (mesh._kind == topology.BOUNDARY)
+        # The polygon around a vertex of valence 2 has no area: those of its neighbours will do.
+        flat = np.flatnonzero(wanted & ~normals.any(axis=1))
+        normals = normals.copy() if flat.size else normals
+        for v in flat:
+            around = stencils.faces[corners[indptr[v] : indptr[v + 1]] // 4]
+            normals[v] = stencils.ring_areas[np.unique(around[around >= 0])].sum(axis=0)
 
     def run(vertices: NDArray[np.int64], degree: int, rings: int) -> Floats:
         return _run(

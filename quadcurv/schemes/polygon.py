@@ -20,8 +20,9 @@ def bunge() -> Scheme:
 
     The virtual vertex minimises the sum of the squared areas of its triangles and is the affine
     combination of the corners with the smallest weights, so that the matrix has none but the mesh's own
-    vertices. On a triangle this is the cotan formula. The dual area is the mixed
-    Voronoi area of the fans, as in libigl.
+    vertices. On a triangle this is the cotan formula. The weights say how a quad differs from a planar one:
+    on nearly planar quads they are sensitive to rounding. The dual area is the mixed Voronoi area of the
+    fans, as in libigl.
 
     Returns
     -------
