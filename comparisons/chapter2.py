@@ -394,9 +394,10 @@ def claims(results: Results) -> list[Claim]:
         Claim(
             "2.1.5, Figure 2.5",
             "The last error deviates due to the precision of the Fresnel integrals",
-            "with Fresnel integrals good to a few units in the last place the error grows like "
-            f"eps/h^2: {r['spiral error at 32768 over eps/h^2']:.1f} eps/h^2 at 32768 points",
-            "reproduced",
+            "it does so with Fresnel integrals good to a few units in the last place: positions rounded to "
+            f"doubles make it grow like eps/h^2, {r['spiral error at 32768 over eps/h^2']:.1f} eps/h^2 at "
+            "32768 points, as on the circle, which has no such integrals",
+            "slip",
         ),
         Claim(
             "2.2, Figure 2.7",

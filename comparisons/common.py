@@ -182,8 +182,10 @@ def convergence_plot(
         if zero.any():
             axes.plot(n[zero], np.full(zero.sum(), floor), linestyle="none", fillstyle="none", **style)
             axes.set_ylim(bottom=floor)
-    for edge in sorted({size for window in fit.values() for size in window}):
-        axes.axvline(edge, color="0.4", linestyle="--", linewidth=0.9)
+    for k, edge in enumerate(sorted({size for window in fit.values() for size in window})):
+        axes.axvline(
+            edge, color="0.4", linestyle="--", linewidth=0.9, label=None if k else "range of the fit"
+        )
     top = max((e[-1] for e in errors.values() if e[-1] > 0), default=floor)
     for slope in slopes:
         tail = n[len(n) // 2 :]

@@ -18,6 +18,7 @@ from rich.console import Console
 
 import quadcurv
 from quadcurv.compare import Comparison
+from quadcurv.fields import FIELDS
 from quadcurv.interop import write
 from quadcurv.mesh import Mesh
 from quadcurv.schemes import SCHEMES
@@ -56,9 +57,9 @@ def compare(
 ) -> None:
     """Mean curvature of a mesh by several schemes: tables and pictures.
 
-    Schemes are compared with their median at each vertex, by valence and in pairs. Two pictures, one
-    view a scheme, show the mean curvature and the disagreement: PNG, or a page in HTML where nothing
-    can render.
+    First come counts of faces, valences and boundary. Schemes are compared with their median at each
+    vertex, by valence and in pairs. Two pictures, one view a scheme, show the mean curvature and the
+    disagreement: PNG, or a page in HTML where nothing can render.
 
     **Examples**
 
@@ -81,6 +82,7 @@ def compare(
     if as_json:
         print(json.dumps(comparison.to_dict(), indent=2))
     else:
+        print(_counts(comparison.mesh))
         Console().print(comparison)
     if csv_file is not None:
         comparison.to_csv(csv_file)
@@ -100,7 +102,7 @@ def curvature(
         str, Parameter(("--scheme", "-s"), help=f"One of {', '.join(SCHEMES)}.")
     ] = "finite_volume",
 ) -> None:
-    """Write mean curvature, normal and quality of every vertex.
+    """Write mean curvature, normal and quality of every vertex, and print what the mesh holds.
 
     **Examples**
 
@@ -117,15 +119,19 @@ def curvature(
     from quadcurv.quality import quality
 
     found = quadcurv.read(mesh)
-    data = {
-        "mean_curvature": quadcurv.mean_curvature(found, scheme),
+    H = quadcurv.mean_curvature(found, scheme)
+    data: dict[str, Any] = {
+        "mean_curvature": H,
         "Normals": quadcurv.vertex_normals(found),
+        "boundary": quadcurv.boundary_treatment(found),
         **quality(found),
     }
     if output.suffix.lower() == ".csv":
         _write_csv(output, found, data)
     else:
         write(output, found, data)
+    print(_counts(found))
+    print(f"undefined: {np.count_nonzero(~np.isfinite(H))} by {scheme}")
     _say(output)
 
 
@@ -135,7 +141,10 @@ def view(
     /,
     *,
     scheme: Schemes = None,
-    field: str = "mean_curvature",
+    field: Annotated[
+        str,
+        Parameter(help=f"What the colours show first: {', '.join(FIELDS)} or 'difference to SCHEME'."),
+    ] = "mean_curvature",
     html: Path | None = None,
     png: Path | None = None,
 ) -> None:
@@ -145,14 +154,12 @@ def view(
 
         quadcurv view spot.obj
         quadcurv view pillow_sphere --field error -s finite_volume -s cotan-6
-        quadcurv view spot.obj --html spot.html
+        quadcurv view spot.obj --html spot.html --field "difference to liu"
 
     Parameters
     ----------
     mesh
         File of a mesh, or the name of a surface with exact curvature.
-    field
-        What the colours show first.
     html
         Write one page that needs no network instead of opening a window.
     png
@@ -236,6 +243,29 @@ def main(arguments: Iterable[str] | None = None) -> None:
             raise SystemExit(2) from None
 
 
+def _counts(mesh: Mesh) -> str:
+    """Lines of what a mesh holds, see :func:`quadcurv.quality.summary`."""
+    from quadcurv.quality import summary
+
+    counts = summary(mesh, schemes=())
+    faces = f"faces: {counts['quads']} quads, {counts['triangles']} triangles"
+    if counts["polygons"]:
+        faces += f" ({counts['polygons']} larger polygon(s) cut into such)"
+    if counts["turned"]:
+        faces += f"; {counts['turned']} turned"
+    vertices = f"vertices: {counts['vertices']}"
+    if counts["coincident"]:
+        vertices += f", {counts['coincident']} of them where another one is"
+    return "\n".join(
+        (
+            faces,
+            vertices,
+            "valence: " + ", ".join(f"{valence} ({n})" for valence, n in counts["valence"].items()),
+            "rings: " + ", ".join(f"{n} {name}" for name, n in counts["boundary"].items()),
+        )
+    )
+
+
 def _comparison(mesh: str | Path, scheme: list[str] | None) -> Comparison:
     from quadcurv.compare import compare
 
@@ -243,12 +273,14 @@ def _comparison(mesh: str | Path, scheme: list[str] | None) -> Comparison:
 
 
 def _refinements(name: str, scheme: list[str] | None) -> Callable[[int], Comparison] | None:
-    """Comparisons on the surface of that name, None if there is no such surface."""
+    """Comparisons on the surface of that name, None if it is a file's."""
     from quadcurv.compare import compare
     from quadcurv.surfaces import SURFACES
 
     if name not in SURFACES:
-        return None
+        if Path(name).suffix or Path(name).exists():
+            return None
+        raise ValueError(f"{name}: neither a file nor a surface, which are {', '.join(SURFACES)}")
     surface = SURFACES[name]()
     layout = "faces" if len(surface.panels) > 1 else "staggered"
 

@@ -86,16 +86,24 @@ class Comparison:
         """Names of the schemes."""
         return tuple(self.mean_curvature)
 
+    @property
+    def reference(self) -> str:
+        """What :attr:`errors` are taken against: "exact", "median of the schemes", or of two the first."""
+        if self.exact is not None:
+            return "exact"
+        return "median of the schemes" if len(self.schemes) > 2 else self.schemes[0]
+
     @cached_property
     def errors(self) -> dict[str, Floats]:
-        """H - exact by scheme; without an exact answer H minus the median of all schemes at the vertex."""
+        """H minus the :attr:`reference` by scheme."""
         reference = self.consensus if self.exact is None else self.exact
         return {name: H - reference for name, H in self.mean_curvature.items()}
 
     @cached_property
     def consensus(self) -> Floats:
-        """Median of all schemes at each vertex; NaN where any of them is."""
-        return np.median(list(self.mean_curvature.values()), axis=0)
+        """Median of all schemes at each vertex, NaN where any of them is; of two schemes the first."""
+        H = list(self.mean_curvature.values())
+        return np.median(H, axis=0) if len(H) > 2 else H[0]
 
     @cached_property
     def spread(self) -> Floats:
@@ -126,7 +134,7 @@ class Comparison:
         summary = {
             "vertices": int(self.valence.size),
             "valence": {str(v): int(np.sum(self.valence == v)) for v in np.unique(self.valence)},
-            "reference": "median of the schemes" if self.exact is None else "exact",
+            "reference": self.reference,
             "undefined": {k: int(np.count_nonzero(np.isnan(H))) for k, H in self.mean_curvature.items()},
             "errors": self.norms(),
             "errors_by_valence": {str(v): e for v, e in self.by_valence().items()},
@@ -149,10 +157,10 @@ class Comparison:
 
     def tables(self) -> list[Table]:
         """Rich tables, 80 columns at most: curvature and norms by scheme, by valence, by pair."""
-        against = "median of the schemes" if self.exact is None else "exact"
+        against = self.reference
         main = _table(
             f"Mean curvature H (1/length) and |H - {against}|",
-            ["scheme", "min H", "max H", "undefined", "mean", "rms", "max"],
+            ["scheme", "min H", "max H", "undefined", "mean", "by area", "rms", "max"],
         )
         for name, H in self.mean_curvature.items():
             e = norms(self.errors[name], self.areas)
@@ -163,7 +171,7 @@ class Comparison:
                 f"{low:.4g}",
                 f"{high:.4g}",
                 str(H.size - known.size),
-                *(_short(e[k]) for k in ("one", "two", "inf")),
+                *(_short(e[k]) for k in ("one", "one-area", "two", "inf")),
             )
         groups = self.by_valence()
         valence = _table(
@@ -203,7 +211,7 @@ class Comparison:
 
 def compare(
     mesh: Any,
-    schemes: Iterable[str | Scheme | Fit] | None = None,
+    schemes: str | Scheme | Fit | Iterable[str | Scheme | Fit] | None = None,
     exact: ArrayLike | Callable[[Floats], ArrayLike] | None = None,
     boundary: str = "extrapolate",
 ) -> Comparison:
@@ -213,11 +221,12 @@ def compare(
     ----------
     mesh
         Anything :func:`quadcurv.as_mesh` takes.
-    schemes : iterable of str or Scheme, optional
+    schemes : str, Scheme or iterable of them, optional
         By default all of ``quadcurv.SCHEMES``.
     exact : array_like or callable, optional
         Exact mean curvature in 1 / length: a number, an array of the shape of the result, or a function
-        of the points. Without it schemes are compared with their median.
+        of the points. Without it schemes are compared with their median,
+        two with the first.
     boundary : {"extrapolate", "nan"}
         See :func:`quadcurv.stencils`.
 
@@ -231,12 +240,15 @@ def compare(
         As :func:`quadcurv.mean_curvature`; no or repeated schemes; exact does not fit.
     """
     mesh = as_mesh(mesh)
-    chosen = [as_scheme(s) for s in (SCHEMES if schemes is None else schemes)]
+    chosen = _chosen(SCHEMES if schemes is None else schemes)
     names = [s.name for s in chosen]
     if not names or len(set(names)) < len(names):
         raise ValueError(f"schemes: expected at least one, each once, got {names}")
     stencils = mesh.stencils()
-    H = {s.name: mean_curvature(mesh, s, boundary) for s in progress(chosen, "schemes", weight=stencils.n)}
+    H = {
+        s.name: mean_curvature(mesh, s, boundary)
+        for s in progress(chosen, "schemes", weight=stencils.n * len(chosen))
+    }
     if callable(exact):
         exact = exact(stencils.points[: stencils.n].reshape(*stencils.shape, 3))
     if exact is not None:
@@ -368,12 +380,13 @@ class Convergence:
 
     def __rich_console__(self, console: Console, options: Any) -> Iterator[Table]:
         yield self.table("one")
+        yield self.table("one-area")
         yield self.table("inf")
 
 
 def convergence(
     surface: Surface,
-    schemes: Iterable[str | Scheme | Fit],
+    schemes: str | Scheme | Fit | Iterable[str | Scheme | Fit],
     shapes: Iterable[int | tuple[int, int]],
     layout: str = "staggered",
 ) -> Convergence:
@@ -383,7 +396,7 @@ def convergence(
     ----------
     surface : Surface
         One of :mod:`quadcurv.surfaces`.
-    schemes : iterable of str or Scheme
+    schemes : str, Scheme or iterable of them
     shapes : iterable of int or (int, int)
         Cells in the two directions; one number stands for both.
     layout : {"staggered", "grid", "faces"}
@@ -401,7 +414,7 @@ def convergence(
     pairs = [(s, s) if isinstance(s, int | np.integer) else (int(s[0]), int(s[1])) for s in shapes]
     if len(pairs) < 2:
         raise ValueError(f"shapes: a rate needs at least two, got {pairs}")
-    chosen = [as_scheme(s) for s in schemes]
+    chosen = _chosen(schemes)
     found: dict[str, list[dict[str, float]]] = {s.name: [] for s in chosen}
     undefined: dict[str, list[int]] = {s.name: [] for s in chosen}
     work = max(r * c for r, c in pairs) * len(chosen)
@@ -423,9 +436,14 @@ def convergence(
 def progress(items: Sequence[T], description: str, weight: int = 0) -> Iterable[T]:
     """Iterate behind a progress bar on a terminal, if the work is of a size to take seconds."""
     console = Console(stderr=True)
-    if weight < 200_000 or not console.is_terminal:
+    if weight < 20_000 or not console.is_terminal:
         return items
     return track(items, description, console=console, transient=True)
+
+
+def _chosen(schemes: str | Scheme | Fit | Iterable[str | Scheme | Fit]) -> list[Scheme | Fit]:
+    """Schemes by name, one or several."""
+    return [as_scheme(s) for s in ([schemes] if isinstance(schemes, str | Scheme | Fit) else schemes)]
 
 
 def _table(title: str, columns: Sequence[str]) -> Table:

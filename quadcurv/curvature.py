@@ -37,7 +37,8 @@ def mean_curvature(
         radius R with outward normals); H = -(H n) . n with n from :func:`vertex_normals`, or a fit's
         own normal. Without sign
         on a non-orientable mesh. NaN where the ring is not one closed fan (isolated vertices, boundaries
-        that are not extrapolated, several fans) or degenerate (a face without area).
+        that are not extrapolated, several fans) or degenerate (a face without area; for the cotan formula
+        also half of one).
 
     Raises
     ------

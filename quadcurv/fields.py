@@ -5,9 +5,11 @@ from __future__ import annotations
 import functools
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
+from itertools import combinations_with_replacement
 from math import ceil, floor, log10
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from quadcurv.compare import Comparison
 from quadcurv.curvature import principal_curvatures
@@ -15,9 +17,11 @@ from quadcurv.mesh import Floats, Ints, Mesh, MeshError, QuadGrid, StaggeredGrid
 from quadcurv.quality import quality
 from quadcurv.schemes import Curvatures
 
-NAN_COLOUR, ZERO_COLOUR = "#b0b0b0", "#ffffff"
+NAN_COLOUR, ZERO_COLOUR = "#b0b0b0", "#f7cbdc"
 OVERLAYS = {"boundary": "#000000", "seam": "#e69f00", "valence < 4": "#56b4e9", "valence > 4": "#d55e00"}
+BARS = 40  # of a histogram
 _DECADES = 6
+_DIFFERENCE = "difference to "
 _SATURATED = 0.05
 
 
@@ -53,6 +57,17 @@ class Field:
         zero = self.shows_zero and any((v < self.limits[0]).any() for v in values)
         undefined = any(np.isnan(v).any() for v in values)
         return [("exactly 0", ZERO_COLOUR)] * zero + [("undefined", NAN_COLOUR)] * undefined
+
+    def histogram(self, scheme: str, areas: Floats) -> Floats:
+        """(BARS,) parts of the area whose values lie in equal parts of the scale.
+
+        The first and the last include what lies beyond; exact zeros and NaN are in none.
+        """
+        low, high = self.limits
+        values, weights = self.values[scheme], np.nan_to_num(areas).ravel()
+        some = np.isfinite(values) & ~(self.shows_zero & (values < low))
+        found = np.histogram(np.clip(values[some], low, high), BARS, self.limits, weights=weights[some])[0]
+        return np.asarray(found / weights.sum())
 
     def within(self, limits: tuple[float, float]) -> Field:
         """The same errors on a scale with other ends, given as errors.
@@ -92,6 +107,12 @@ class Field:
         return f"≤ {number}" if self.logarithmic and value <= self.limits[0] else number
 
 
+def names(comparison: Comparison) -> list[str]:
+    """Fields of a comparison: :data:`FIELDS` and, of several schemes, "difference to SCHEME" for each."""
+    references = comparison.schemes if len(comparison.schemes) > 1 else ()
+    return [*FIELDS, *(_DIFFERENCE + scheme for scheme in references)]
+
+
 @functools.lru_cache(maxsize=2)
 def field(comparison: Comparison, name: str) -> Field:
     """Field of a comparison, on its colour scale.
@@ -100,7 +121,7 @@ def field(comparison: Comparison, name: str) -> Field:
     ----------
     comparison : Comparison
     name : str
-        Of :data:`FIELDS`.
+        Of :func:`names`.
 
     Returns
     -------
@@ -111,9 +132,12 @@ def field(comparison: Comparison, name: str) -> Field:
     ValueError
         Unknown name.
     """
-    if name not in FIELDS:
-        raise ValueError(f"field: expected one of {', '.join(FIELDS)}, got {name!r}")
-    return FIELDS[name](comparison)
+    if name not in names(comparison):
+        expected = ", ".join([*FIELDS, f"{_DIFFERENCE}SCHEME"])
+        raise ValueError(f"field: expected one of {expected}, got {name!r}")
+    if name in FIELDS:
+        return FIELDS[name](comparison)
+    return _difference(comparison, name.removeprefix(_DIFFERENCE))
 
 
 def _mean_curvature(comparison: Comparison) -> Field:
@@ -124,20 +148,30 @@ def _mean_curvature(comparison: Comparison) -> Field:
 
 def _error(comparison: Comparison) -> Field:
     if comparison.exact is None:
-        title = "difference to the median of the schemes, |H − median| (1/length)"
+        title = f"difference |H − {comparison.reference}| (1/length)"
         return _decades(title, comparison.errors, shows_zero=False)
     return _decades("error |H − exact| (1/length)", comparison.errors, shows_zero=True)
 
 
 def _signed_error(comparison: Comparison) -> Field:
-    reference = "median of the schemes" if comparison.exact is None else "exact"
-    return _linear(comparison, f"H − {reference} (1/length)", comparison.errors)
+    return _linear(comparison, f"H − {comparison.reference} (1/length)", comparison.errors)
 
 
-def _difference(comparison: Comparison) -> Field:
-    first, reference = next(iter(comparison.mean_curvature.items()))
-    differences = {name: H - reference for name, H in comparison.mean_curvature.items()}
-    return _decades(f"difference to {first}, |H − H'| (1/length)", differences, shows_zero=True)
+def _difference(comparison: Comparison, reference: str) -> Field:
+    differences = _differences(comparison)
+    values = {s: differences.values[_pair(s, reference)] for s in comparison.schemes}
+    return replace(differences, title=f"difference to {reference}, |H − H'| (1/length)", values=values)
+
+
+@functools.lru_cache(maxsize=1)
+def _differences(comparison: Comparison) -> Field:
+    """Of every two schemes, on one scale whichever is the reference."""
+    pairs = combinations_with_replacement(comparison.mean_curvature.items(), 2)
+    return _decades("", {_pair(a, b): H - other for (a, H), (b, other) in pairs}, shows_zero=True)
+
+
+def _pair(a: str, b: str) -> str:
+    return " − ".join(sorted((a, b)))
 
 
 def _gaussian_curvature(comparison: Comparison) -> Field:
@@ -161,10 +195,23 @@ def _principal_curvature(sign: int, name: str) -> Callable[[Comparison], Field]:
 
 def _quality(measure: str, title: str, limits: tuple[float, float]) -> Callable[[Comparison], Field]:
     def field(comparison: Comparison) -> Field:
-        found = quality(comparison.mesh)[measure].ravel().astype(np.float64)
+        found = _quality_of(comparison.mesh)[measure].ravel()
         return Field(title, dict.fromkeys(comparison.schemes, found), "viridis", limits)
 
     return field
+
+
+def _small_quality(measure: str, title: str) -> Callable[[Comparison], Field]:
+    def field(comparison: Comparison) -> Field:
+        values = dict.fromkeys(comparison.schemes, _quality_of(comparison.mesh)[measure])
+        return _decades(title, values, shows_zero=True)
+
+    return field
+
+
+@functools.lru_cache(maxsize=1)
+def _quality_of(mesh: Mesh) -> dict[str, Floats]:
+    return quality(mesh)
 
 
 def _valence(comparison: Comparison) -> Field:
@@ -219,15 +266,16 @@ FIELDS: dict[str, Callable[[Comparison], Field]] = {
     "mean_curvature": _mean_curvature,
     "error": _error,
     "signed_error": _signed_error,
-    "difference": _difference,
     "gaussian_curvature": _gaussian_curvature,
     "k1": _principal_curvature(+1, "k1"),
     "k2": _principal_curvature(-1, "k2"),
     "valence": _valence,
     "skew": _quality("skew", "skew of the worst face (degrees from 90, in triangles 60)", (0.0, 90.0)),
     "aspect": _quality("aspect", "longest over shortest edge of the worst face", (1.0, 5.0)),
+    "nonplanarity": _small_quality("nonplanarity", "gap over mean length of the diagonals, worst face"),
+    "roughness": _small_quality("roughness", "relative error of extrapolation at the boundary, about"),
 }
-"""Fields that a map can show, by name."""
+"""Fields that a map of any comparison can show, by name."""
 
 
 @functools.lru_cache(maxsize=2)
@@ -255,13 +303,11 @@ def drawn(mesh: Mesh) -> tuple[Floats, Ints, bool]:
 def overlays(mesh: Mesh) -> dict[str, Ints]:
     """Edges (k, 2) of the boundary and of seams, vertices (k,) of too few and too many faces.
 
-    Extraordinary vertices are interior ones of a valence other than 4; seams are where a grid wraps.
-    What a mesh has none of is left out, and so is all of a staggered grid, which is made of cells.
+    Extraordinary vertices are interior ones of a valence other than 4; a staggered grid, made of cells,
+    has none. Seams are where a grid wraps, and where two edges of the boundary lie at the same place, as
+    along a fold. What a mesh has none of is left out.
     """
-    stencils = mesh.stencils()
     points, faces, on_cells = drawn(mesh)
-    if on_cells:
-        return {}
     sides = np.where(faces[:, 3] < 0, 3, 4)
     face, slot = np.nonzero(np.arange(4) < sides[:, None])
     ends = np.stack((faces[face, slot], faces[face, (slot + 1) % sides[face]])).astype(np.int64)
@@ -269,15 +315,19 @@ def overlays(mesh: Mesh) -> dict[str, Ints]:
     key, count = np.unique(ends[0] * len(points) + ends[1], return_counts=True)
     edges = np.stack(np.divmod(key, len(points)), axis=1).astype(np.int32)
     interior = np.ones(len(points), bool)
-    interior[edges[count == 1]] = False
-    seams = np.empty((0, 2), np.int32)
+    border = edges[count == 1]
+    interior[border] = False
+    middles = points[border].mean(axis=1)
+    gap = cKDTree(middles).query(middles, k=2)[0][:, 1]
+    meets = gap < 1e-9 * np.ptp(points, axis=0).max()
+    seams = border[meets]
     if isinstance(mesh, QuadGrid):
         index = np.arange(len(points), dtype=np.int32).reshape(mesh.shape)
         along = [line for line, wraps in ((index[0], mesh.wrap[0]), (index[:, 0], mesh.wrap[1])) if wraps]
         seams = np.concatenate([seams, *(np.stack((line[:-1], line[1:]), axis=1) for line in along)])
-    valence = stencils.valence
+    valence = np.full(len(points), 4) if on_cells else mesh.stencils().valence
     marks = {
-        "boundary": edges[count == 1],
+        "boundary": border[~meets],
         "seam": seams,
         "valence < 4": np.flatnonzero(interior & (valence < 4) & (valence > 0)).astype(np.int32),
         "valence > 4": np.flatnonzero(interior & (valence > 4)).astype(np.int32),

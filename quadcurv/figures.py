@@ -3,18 +3,25 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from io import BytesIO
 
 import numpy as np
+from matplotlib import rc_context
+from matplotlib.figure import Figure
 
 from quadcurv.compare import NORMS, Convergence
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 # Okabe and Ito (2008): told apart with every kind of colour blindness.
 _COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#000000")
 _MARKERS = "os^Dv*XP<>"
+
+
+class _Figure(Figure):
+    def _repr_png_(self) -> bytes:
+        """How a notebook shows it, with or without its own backend of matplotlib."""
+        file = BytesIO()
+        self.savefig(file, dpi=150)
+        return file.getvalue()
 
 
 def convergence_figure(convergence: Convergence, norms: Sequence[str] = ("one", "inf")) -> Figure:
@@ -37,14 +44,11 @@ def convergence_figure(convergence: Convergence, norms: Sequence[str] = ("one", 
     ValueError
         No or unknown norms.
     """
-    from matplotlib import rc_context
-    from matplotlib.figure import Figure
-
     if not norms or not set(norms) <= set(NORMS):
         raise ValueError(f"norms: expected any of {', '.join(NORMS)}, got {list(norms)}")
     n = convergence.sizes
     with rc_context({"font.size": 9, "axes.spines.top": False, "axes.spines.right": False}):
-        figure = Figure(
+        figure = _Figure(
             figsize=(3.6 * len(norms), 3.4 + 0.11 * len(convergence.schemes)), layout="constrained"
         )
         figure.suptitle(f"Mean curvature on {convergence.surface.replace('_', ' ')}, {convergence.layout}")

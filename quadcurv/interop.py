@@ -290,8 +290,10 @@ def to_pymeshlab(mesh: QuadMesh) -> Any:
     """See :meth:`quadcurv.QuadMesh.to_pymeshlab`."""
     try:
         import pymeshlab
-    except ImportError:
+    except ModuleNotFoundError:
         raise ImportError('pymeshlab is not installed: pip install "quadcurv[meshlab]"') from None
+    except ImportError as error:
+        raise ImportError(f"pymeshlab lacks a system library (on Debian, libgl1): {error}") from None
     meshes = pymeshlab.MeshSet()
     # A file, since the constructor that takes polygons rounds positions to single precision.
     with tempfile.TemporaryDirectory() as folder:

@@ -26,7 +26,7 @@ def save_page(comparison: Comparison, path: str | Path, field: str = "mean_curva
     comparison : Comparison
     path : path-like
     field : str
-        The one of :data:`quadcurv.fields.FIELDS` to show first.
+        The one of :func:`quadcurv.fields.names` to show first.
 
     Raises
     ------
@@ -37,7 +37,7 @@ def save_page(comparison: Comparison, path: str | Path, field: str = "mean_curva
     points, faces, on_cells = fields.drawn(comparison.mesh)
     towards, up = fields.viewpoint(points)
     arrays: dict[bytes, int] = {}
-    shown = [_field(name, fields.field(comparison, name), arrays) for name in fields.FIELDS]
+    shown = [_field(name, fields.field(comparison, name), arrays) for name in fields.names(comparison)]
     data = {
         "field": field,
         "schemes": comparison.schemes,
@@ -45,6 +45,8 @@ def save_page(comparison: Comparison, path: str | Path, field: str = "mean_curva
         "points": _encode(points - points.mean(axis=0), "<f4"),
         "faces": _encode(faces, "<i4"),
         "valence": _encode(comparison.valence, "u1"),
+        "areas": _encode(np.nan_to_num(comparison.areas), "<f4"),
+        "bars": fields.BARS,
         "towards": towards.tolist(),
         "up": up.tolist(),
         "overlays": [
@@ -76,7 +78,7 @@ def _field(name: str, field: Field, arrays: dict[bytes, int]) -> dict[str, Any]:
         values[scheme] = arrays.setdefault(array, len(arrays))
     return {
         "name": name,
-        "label": name.replace("_", " "),
+        "label": name.replace("_", " ") if name in fields.FIELDS else name,
         "title": field.title,
         "limits": field.limits,
         "logarithmic": field.logarithmic,

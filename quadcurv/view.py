@@ -18,18 +18,20 @@ from quadcurv import fields
 from quadcurv.compare import Comparison
 from quadcurv.curvature import vertex_normals
 from quadcurv.fields import NAN_COLOUR, OVERLAYS, ZERO_COLOUR
-from quadcurv.mesh import Floats, Ints, grid_faces
+from quadcurv.mesh import Floats, Ints
 from quadcurv.page import save_page
 
 if TYPE_CHECKING:
     import pyvista as pv
+    from vtkmodules.vtkRenderingCore import vtkActor2D
 
 PANEL, LEGEND, CONTROLS = 400, 120, 95  # pixels: side of a view, heights of the rows below
-SCREEN = 1600, 800  # pixels that the views of a window may take
+SCREEN = 1600, 700  # pixels that the views of a window may take
 VALUES = "values"  # name of the coloured array
 _SCALE = 1.5  # pixels of a picture to one of a window
 _LARGE = 20_000  # faces; beyond that edges hide the colours, and a window draws what turns coarsely
 _COARSE = 32  # cells of a coarse surface along the longest side
+_HISTOGRAM = 0.1  # height of a histogram to that of a view
 RING_COLOUR = "#cc3399"
 
 
@@ -70,7 +72,7 @@ def save_maps(comparison: Comparison, path: str | Path, field: str = "error") ->
         ``.png`` for a picture, which needs a usable OpenGL; ``.html`` for a page with linked views that
         needs none and no network.
     field : str
-        One of :data:`quadcurv.fields.FIELDS`.
+        One of :func:`quadcurv.fields.names`.
 
     Raises
     ------
@@ -100,13 +102,13 @@ def maps(comparison: Comparison, field: str = "error") -> pv.Plotter:
     """Scene for a file, with one linked view a scheme and one colour bar.
 
     Signed fields have a diverging scale, its ends passed on 5 % of the area; errors a logarithmic one of
-    whole decades. NaN is grey; in errors what is exactly 0 is white.
+    whole decades. NaN is grey; in errors what is exactly 0 is pale pink.
 
     Parameters
     ----------
     comparison : Comparison
     field : str
-        One of :data:`quadcurv.fields.FIELDS`.
+        One of :func:`quadcurv.fields.names`.
 
     Returns
     -------
@@ -150,14 +152,15 @@ class View:
 
     In a window the keys, and the buttons below, are: right and left arrow for the next and previous
     field, ``m`` for the edges of the mesh, ``o`` for boundaries, seams and extraordinary vertices, ``n``
-    for mean curvature normals, ``d`` for principal directions, ``r`` to fit the camera. A click on the
-    surface shows the values at the nearest vertex and its ring in all views.
+    for mean curvature normals, ``d`` for principal directions, ``h`` for the histogram by area under each
+    view, ``r`` to fit the camera. A click on the surface shows the values at the nearest vertex and its
+    ring in all views.
 
     Parameters
     ----------
     comparison : Comparison
     field : str
-        One of :data:`quadcurv.fields.FIELDS`.
+        One of :func:`quadcurv.fields.names`.
     off_screen : bool
         Whether the scene is for a file rather than a window; it then has no controls.
     refined : callable, optional
@@ -171,7 +174,7 @@ class View:
     picked : int or None
         Vertex, or cell of a staggered grid, in the order of flattened results.
     shown : set of str
-        What is drawn over the surface, of "edges", "overlays", "normals" and "directions".
+        What is drawn over the surface, of "edges", "overlays", "normals", "directions" and "histogram".
 
     Raises
     ------
@@ -247,22 +250,27 @@ class View:
                 coarse[VALUES] = values[self._nearest]
             mapper.scalar_range = shown.limits
         self._add_legend()
+        self._redraw("histogram")
         self._report()
 
     def next_field(self, step: int = 1) -> None:
         """Colour all views by the next field, after the last one the first again."""
-        names = list(fields.FIELDS)
+        names = fields.names(self.comparison)
         self.show_field(names[(names.index(self.field) + step) % len(names)])
         self.plotter.render()
 
     def toggle(self, what: str) -> None:
-        """Draw or remove "edges", "overlays", "normals" (of mean curvature) or "directions" (principal)."""
+        """Draw or remove "edges", "overlays", "normals" (of mean curvature), "directions" (principal) or
+        "histogram" (of the colours, by area).
+        """
         self.shown ^= {what}
         if what == "edges":
             for actor in self._surfaces:
                 actor.prop.show_edges = what in self.shown
         else:
             self._redraw(what)
+        if what == "histogram":
+            _make_room(self.plotter.renderers[0].camera, what in self.shown)
         self._add_legend()
         self.plotter.render()
 
@@ -278,7 +286,7 @@ class View:
             self._redraw(what)
         self.show_field(self.field)
         self.plotter.subplot(self._rows + 1, 0)
-        self._text(f"refinement {self._level}", (0.845, 0.12), 6 / self._scale, name="refinement")
+        self._text(f"refinement {self._level}", (0.86, 0.12), 6 / self._scale, name="refinement")
         self.plotter.render()
 
     def pick(self, x: int, y: int) -> None:
@@ -316,6 +324,8 @@ class View:
         """Fit the surface into the views."""
         self.plotter.subplot(0, 0)
         _look_at(self.plotter.camera, self._points)
+        if "histogram" in self.shown:
+            _make_room(self.plotter.camera, True)
 
     def _subplot(self, i: int) -> None:
         self.plotter.subplot(*divmod(i, self._columns))
@@ -372,6 +382,9 @@ class View:
         self._clear(what)
         if what not in self.shown:
             return
+        if what == "histogram":
+            self._add_histograms()
+            return
         draw = {"overlays": self._overlays, "normals": self._normals, "directions": self._directions}[what]
         for i, scheme in enumerate(self.comparison.schemes):
             self._subplot(i)
@@ -398,6 +411,20 @@ class View:
     def _clear(self, what: str) -> None:
         for renderer, actor in self._drawn.pop(what, []):
             renderer.remove_actor(actor, render=False)
+
+    def _add_histograms(self) -> None:
+        """Under each surface how much of the area has which colour; the scale across is the colour bar's."""
+        shown = fields.field(self.comparison, self.field)
+        parts = {s: shown.histogram(s, self.comparison.areas) for s in self.comparison.schemes}
+        highest = max(p.max() for p in parts.values()) or 1.0
+        colours = self._table.values[np.linspace(0, 255, fields.BARS).astype(int), :3]
+        for i, part in enumerate(parts.values()):
+            self._subplot(i)
+            heights = _HISTOGRAM * part / highest
+            outline = heights + 0.004 * (heights > 0)  # for what is pale
+            for fill, tops in (([[128] * 3] * fields.BARS, outline), (colours, heights)):
+                bars = self._strip(np.linspace(0.1, 0.9, fields.BARS + 1), fill, 0.0, tops)
+                self._drawn.setdefault("histogram", []).append((self.plotter.renderer, bars))
 
     def _overlays(self, _: str) -> Iterator[Drawing]:
         """Edges of the boundary and of seams, and extraordinary vertices, each in the colour of its name."""
@@ -437,7 +464,7 @@ class View:
         fit = fields.jet(self.comparison)
         normals = self._vertex_normals()
         for direction, colour in ((fit.direction1, "black"), (fit.direction2, "white")):
-            vectors = 0.012 * self._diagonal * direction.reshape(-1, 3)
+            vectors = 0.018 * self._diagonal * direction.reshape(-1, 3)
             some = self._some(vectors)
             middle = self._sites[some] + 2e-3 * self._diagonal * normals[some]
             ends = np.stack((middle - vectors[some], middle + vectors[some]), axis=1).reshape(-1, 3)
@@ -448,9 +475,9 @@ class View:
         return vertex_normals(self.comparison.mesh, "nan").reshape(-1, 3)
 
     def _some(self, vectors: Floats) -> Ints:
-        """One site in every cube of 3 % of the surface's size, among those with a vector."""
+        """One site in every cube of 5 % of the surface's size, among those with a vector."""
         known = np.flatnonzero(np.isfinite(vectors).all(axis=1) & (vectors != 0).any(axis=1))
-        cubes = np.floor(self._sites[known] / (0.03 * self._diagonal)).astype(np.int32)
+        cubes = np.floor(self._sites[known] / (0.05 * self._diagonal)).astype(np.int32)
         return known[np.unique(cubes, axis=0, return_index=True)[1]].astype(np.int32)
 
     def _report(self) -> None:
@@ -496,16 +523,22 @@ class View:
             self._text(label, (left + (place - low) / (high - low) * (right - left), 0.2), 10)
         for i, (label, colour) in enumerate(patches):
             x = right + 0.11 * (i + 1)
-            self._strip(np.array([x - 0.03, x + 0.03]), [pv.Color(colour).int_rgb])
+            for margin, fill in ((1.0, "grey"), (0.0, colour)):  # an outline, for what is pale
+                dx, dy = margin / self.plotter.window_size[0], margin / LEGEND
+                ends = np.array([x - 0.03 - dx, x + 0.03 + dx])
+                self._strip(ends, [pv.Color(fill).int_rgb], 0.4 - dy, 0.62 + dy)
             self._text(label, (x, 0.2), 9)
 
-    def _strip(self, edges: Floats, colours: ArrayLike) -> None:
+    def _strip(
+        self, edges: Floats, colours: ArrayLike, bottom: float = 0.4, tops: ArrayLike = 0.62
+    ) -> vtkActor2D:
         """Coloured cells side by side in the current view, between edges from 0 to 1."""
         from vtkmodules.vtkRenderingCore import vtkActor2D, vtkCoordinate, vtkPolyDataMapper2D
 
-        corners = np.stack(np.broadcast_arrays(edges[:, None], [0.4, 0.62], 0.0), axis=-1)
-        index = np.arange(2 * len(edges), dtype=np.int32).reshape(-1, 2)
-        strip = polydata(corners.reshape(-1, 3), grid_faces(index))
+        left, right, low, high, zero = np.broadcast_arrays(edges[:-1], edges[1:], bottom, tops, 0.0)
+        corners = np.array([(left, low, zero), (right, low, zero), (right, high, zero), (left, high, zero)])
+        faces = np.arange(4 * len(left), dtype=np.int32).reshape(-1, 4)
+        strip = polydata(np.moveaxis(corners, 2, 0).reshape(-1, 3), faces)
         strip.cell_data["colours"] = np.array(colours, np.uint8)
         strip.cell_data.active_scalars_name = "colours"
         coordinate = vtkCoordinate()
@@ -517,6 +550,7 @@ class View:
         actor = vtkActor2D()
         actor.SetMapper(mapper)
         self.plotter.renderer.AddViewProp(actor)
+        return actor
 
     def _text(self, text: str, position: tuple[float, float], size: float, name: str | None = None) -> None:
         """Text centred at a position of the current view, in coordinates from 0 to 1."""
@@ -534,6 +568,8 @@ class View:
         )
         actor.prop.justification_horizontal = "center"
         actor.prop.justification_vertical = "center"
+        actor.prop.background_color = "white"  # arrows may reach behind a title
+        actor.prop.background_opacity = 0.85
 
     def _add_controls(self) -> None:
         plotter = self.plotter
@@ -545,9 +581,10 @@ class View:
             ("overlays (o)", "o", lambda: self.toggle("overlays")),
             ("normals (n)", "n", lambda: self.toggle("normals")),
             ("directions (d)", "d", lambda: self.toggle("directions")),
+            ("histogram (h)", "h", lambda: self.toggle("histogram")),
         ]
         for i, (label, key, action) in enumerate(buttons):
-            x = 35 + 105 * i
+            x = 35 + 95 * i
             plotter.add_checkbox_button_widget(
                 lambda _, action=action: action(),
                 position=(x, 30),
@@ -561,18 +598,19 @@ class View:
             plotter.add_key_event(key, action)
         plotter.add_key_event("Left", lambda: self.next_field(-1))
         if self._refined is not None:
-            plotter.add_slider_widget(
+            slider = plotter.add_slider_widget(
                 self.refine,
                 rng=(0, self.LEVELS - 1),
                 value=self.START,
-                pointa=(0.72, 0.42),
+                pointa=(0.75, 0.42),
                 pointb=(0.97, 0.42),
                 fmt="%.0f",
                 color="#0072b2",
                 slider_width=0.1,
                 tube_width=0.02,
             )
-            self._text(f"refinement {self._level}", (0.845, 0.12), 6 / self._scale, name="refinement")
+            slider.GetRepresentation().ShowSliderLabelOff()  # it would be tiny
+            self._text(f"refinement {self._level}", (0.86, 0.12), 6 / self._scale, name="refinement")
         pressed: list[tuple[int, int]] = []
         interactor = plotter.iren.interactor
 
@@ -614,3 +652,10 @@ def _look_at(camera: pv.Camera, points: Floats) -> None:
     camera.parallel_projection = True
     camera.parallel_scale = float(max(half[0] / 0.96, half[1] / 0.88)) or 1.0
     camera.SetWindowCenter(0, 0.08)
+
+
+def _make_room(camera: pv.Camera, room: bool) -> None:
+    """Draw all smaller above a histogram, or as before."""
+    factor = 0.88 / (0.88 - _HISTOGRAM)
+    camera.parallel_scale *= factor if room else 1 / factor
+    camera.SetWindowCenter(0, 0.08 - _HISTOGRAM * room)

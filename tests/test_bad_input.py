@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 import warnings
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from copy import deepcopy
 
 import numpy as np
@@ -15,6 +15,7 @@ from hypothesis import strategies as st
 import quadcurv as qc
 from quadcurv import SCHEMES, MeshError, QuadGrid, QuadMesh, Scheme, StaggeredGrid, surfaces
 from quadcurv.boundary import OPEN, boundary_treatment, roughness
+from quadcurv.compare import compare
 from quadcurv.quality import quality, summary
 
 LAPLACIANS = [name for name, scheme in SCHEMES.items() if isinstance(scheme, Scheme)]
@@ -678,6 +679,12 @@ def run_everything(mesh, scheme, boundary):
     for verb in verbs:
         with rejection_names_the_place():
             verb()
+    if isinstance(mesh, qc.QuadMesh):
+        for convert in (qc.as_grid, qc.pair_triangles, qc.merge_points, qc.duplicate_points):
+            with suppress(MeshError):
+                convert(mesh)
+    with rejection_names_the_place():
+        assert compare(mesh, scheme, boundary=boundary).to_dict()["vertices"] == n
 
 
 def check_stencils(mesh, boundary):

@@ -121,7 +121,7 @@ def test_convergence_plot() -> None:
     assert rates["second"] == pytest.approx(2)
     assert np.isnan(rates["exact"])
     labels = [text.get_text() for text in axes.get_legend().get_texts()]
-    assert labels == ["exact", "second: rate 2.00", "partly", "rounding, eps"]
+    assert labels == ["exact", "second: rate 2.00", "partly", "range of the fit", "rounding, eps"]
     dashed = [line.get_xdata()[0] for line in axes.lines if line.get_linestyle() == "--"]
     assert dashed == [8, 16, 64]
     open_markers = [line for line in axes.lines if line.get_fillstyle() == "none"]

@@ -99,6 +99,28 @@ def test_curvature_is_written_beside_the_mesh(ball, tmp_path, suffix):
     assert {"valence", "skew", "aspect", "nonplanarity"} <= set(names)
 
 
+def test_counts_of_a_mesh_are_printed(tmp_path, capsys):
+    """A pentagon, a triangle, two quads, one face the wrong way round, and an isolated vertex."""
+    points = [(x, y, x * y) for y in range(3) for x in range(3)]
+    faces = [(0, 1, 4, 3), (1, 4, 5, 2), (3, 4, 6), (5, 8, 7, 6, 4)]
+    path = tmp_path / "mixed.off"
+    rows = [(len(points) + 1, len(faces), 0), *points, (0, 0, 0), *((len(face), *face) for face in faces)]
+    path.write_text("OFF\n" + "\n".join(" ".join(map(str, row)) for row in rows))
+    assert run("curvature", path, "-o", tmp_path / "out.csv", "-s", "jet-2") == 0
+    out = capsys.readouterr().out.splitlines()
+    valence = quadcurv.read(path).stencils().valence
+    H = [row["mean_curvature"] for row in table(tmp_path / "out.csv")]
+    assert out == [
+        "faces: 2 quads, 4 triangles (1 larger polygon(s) cut into such); 1 turned",
+        "vertices: 10, 1 of them where another one is",
+        "valence: " + ", ".join(f"{v} ({(valence == v).sum()})" for v in np.unique(valence)),
+        "rings: 1 interior, 0 extrapolated, 9 open",
+        f"undefined: {H.count('nan')} by jet-2",
+    ]
+    assert run("compare", path, "-s", "liu", "--output", tmp_path) == 0
+    assert capsys.readouterr().out.splitlines()[:4] == out[:4]
+
+
 def test_curvature_as_csv(ball, tmp_path):
     assert run("curvature", ball, "-o", tmp_path / "out.csv") == 0
     mesh = quadcurv.read(ball)
@@ -176,7 +198,7 @@ def test_reproduce_knows_the_chapters():
         (["curvature", "{ball}"], "--output"),
         (["curvature", "{ball}", "-o", "out.xyz"], r"cannot write \.xyz"),
         (["curvature", "{ball}", "-o", "{folder}/no/out.csv"], "No such file or directory"),
-        (["view", "klein_bottle", "--html", "page.html"], "klein_bottle"),
+        (["view", "klein_bottle", "--html", "page.html"], "neither a file nor a surface, .*torus"),
         (
             ["view", "torus", "--field", "colour", "--html", "page.html"],
             "field: expected one of mean_curvature",

@@ -70,6 +70,7 @@ def test_comparison_without_an_exact_answer():
     result = compare(mesh)
     assert result.exact is None
     assert result.schemes == tuple(SCHEMES)
+    assert result.reference == "median of the schemes"
     stack = np.array(list(result.mean_curvature.values()))
     assert np.array_equal(result.consensus, np.median(stack, axis=0))
     assert np.array_equal(result.spread, stack.max(axis=0) - stack.min(axis=0))
@@ -80,6 +81,15 @@ def test_comparison_without_an_exact_answer():
     text = printed(result)
     assert "Mean difference |H - H'| between schemes" in text
     assert "…" not in text
+
+
+def test_of_two_schemes_the_first_is_the_reference():
+    mesh = surfaces.cubed_ellipsoid().sample((4, 4), "faces")[0]
+    result = compare(mesh, ["liu", "finite_volume"])
+    assert result.reference == "liu"
+    assert result.norms()["liu"]["inf"] == 0
+    assert result.norms()["finite_volume"] == result.differences()["liu", "finite_volume"]
+    assert compare(mesh, "liu").schemes == ("liu",)
 
 
 def test_undefined_vertices_are_counted_and_left_out():

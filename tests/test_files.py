@@ -224,7 +224,7 @@ def test_ply_values_are_double_and_keep_their_kind(tmp_path, mesh, values):
 
 
 def test_ply_quality_is_meshlabs_vertex_scalar_in_double(tmp_path, mesh, values):
-    pymeshlab = pytest.importorskip("pymeshlab")
+    pymeshlab = pytest.importorskip("pymeshlab", exc_type=ImportError)
     write(tmp_path / "mesh.ply", mesh, {"H": values["H"], "quality": values["valence"] / 3})
     meshes = pymeshlab.MeshSet()
     meshes.load_new_mesh(str(tmp_path / "mesh.ply"))

@@ -18,7 +18,7 @@ FLOORS = [
     ["schemes", "boundary", "convert", "files", "interop"],
     ["curvature", "curves", "quality", "surfaces"],
     ["compare", "estimate"],
-    ["fields", "figures", "page", "view", "plugin", "cli"],
+    ["fields", "figures", "page", "view", "plugin", "scene", "cli"],
 ]
 FLOOR = {name: i for i, floor in enumerate(FLOORS) for name in floor}
 

@@ -39,7 +39,7 @@ def mesh() -> QuadMesh:
 
 @pytest.fixture
 def meshlab():
-    return pytest.importorskip("pymeshlab")
+    return pytest.importorskip("pymeshlab", exc_type=ImportError)
 
 
 # ----------------------------------------------------------------------------------------- as_mesh

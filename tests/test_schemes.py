@@ -392,3 +392,14 @@ def test_a_face_without_area_spoils_its_own_vertices_only():
     points = mesh.points.copy()
     points[face[2]] = points[face[0]]  # one diagonal of length zero
     assert set(np.flatnonzero(np.isnan(qc.mean_curvature((points, mesh.faces), "liu")))) == set(face)
+
+
+@every_scheme
+@pytest.mark.parametrize("kind", ["torus", "mixed"])
+def test_an_offset_costs_no_digits(request, kind, scheme):
+    """A million away, of positions that are the same numbers there."""
+    mesh = request.getfixturevalue(kind)
+    far = mesh.points + 1e6
+    make = (lambda x: qc.QuadGrid(x, mesh.wrap)) if kind == "torus" else mesh.with_points
+    near, away = (qc.mean_curvature(make(x), scheme) for x in (far - 1e6, far))
+    assert np.abs(away - near).max() < 1e-9 * np.abs(near).max()

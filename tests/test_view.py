@@ -10,6 +10,7 @@ import subprocess
 import sys
 import time
 from contextlib import contextmanager
+from io import BytesIO
 from itertools import pairwise
 from pathlib import Path
 
@@ -20,6 +21,7 @@ from PIL import Image, ImageGrab
 
 from quadcurv import QuadGrid, QuadMesh, fields, surfaces, view
 from quadcurv.compare import Comparison, compare, convergence
+from quadcurv.quality import quality
 
 IMAGES = Path(__file__).parent / "images"
 GL_LIBRARIES = [
@@ -94,10 +96,39 @@ def test_without_an_exact_answer_schemes_are_compared_with_their_median():
     assert shown.patches() == []  # that one scheme is the median is no exact answer
 
 
-def test_difference_is_to_the_first_scheme():
-    shown = fields.field(made_up(a=[1.0, 2.0] * 2, b=[1.5, 2.0] * 2), "difference")
-    assert [shown.text(v) for v in shown.values["b"][:2]] == ["0.5", "0"]
-    assert shown.patches() == [("exactly 0", fields.ZERO_COLOUR)]
+def test_difference_to_a_scheme_of_choice():
+    found = made_up(a=[1.0, 2.0] * 2, b=[1.5, 2.0] * 2, c=[31.0, 2.5] * 2)
+    assert fields.names(found)[-3:] == ["difference to a", "difference to b", "difference to c"]
+    for reference, differences in (("a", ["0", "0", "0.5", "0", "30", "0.5"]), ("b", ["0.5", "0", "0", "0"])):
+        shown = fields.field(found, f"difference to {reference}")
+        texts = [shown.text(v) for values in shown.values.values() for v in values[:2]]
+        assert texts[: len(differences)] == differences
+        assert shown.title.startswith(f"difference to {reference}")
+        assert shown.patches() == [("exactly 0", fields.ZERO_COLOUR)]
+        assert shown.limits == (-1, 2)  # whichever is the reference
+    with pytest.raises(ValueError, match=r"field: expected .*, difference to SCHEME, got 'difference to d'"):
+        fields.field(found, "difference to d")
+    assert fields.names(made_up(a=[1.0] * 4)) == list(fields.FIELDS)
+
+
+def test_histogram_weighs_by_area_and_leaves_out_what_has_no_place_on_the_scale():
+    H = [0.0, np.nan, 1.0, 1.0, 1e-8, 1e-3, 1e-3, 1.0]
+    shown = fields.field(made_up(a=H, areas=[2, 2, 1, 1, 4, 3, 3, np.nan]), "error")
+    assert shown.limits == (-6, 0)
+    expected = np.zeros(fields.BARS)
+    expected[[0, fields.BARS // 2, -1]] = np.array([4, 6, 2]) / 16
+    np.testing.assert_allclose(shown.histogram("a", np.array([2, 2, 1, 1, 4, 3, 3, np.nan])), expected)
+
+
+def test_qualities_of_every_kind():
+    bent = surfaces.tanh_sheet().sample((6, 6))[0]
+    found = compare(bent, ["liu"])
+    for measure, values in quality(bent).items():
+        shown = fields.field(found, measure)
+        known = 10 ** shown.values["liu"] if shown.logarithmic else shown.values["liu"]
+        some = values.ravel() > 1e-5
+        assert some.any()
+        np.testing.assert_allclose(known[some], values.ravel()[some])
 
 
 def test_signed_scale_ends_where_five_percent_of_the_area_lie_beyond():
@@ -109,7 +140,7 @@ def test_signed_scale_ends_where_five_percent_of_the_area_lie_beyond():
 
 
 def test_fields_of_nothing_but_zero_or_nan_still_have_a_scale():
-    for name in ("mean_curvature", "error", "signed_error", "difference"):
+    for name in ("mean_curvature", "error", "signed_error"):
         for value in (0.0, np.nan):
             low, high = fields.field(made_up(a=[value] * 4), name).limits
             assert low < high
@@ -158,6 +189,22 @@ def test_overlays_of_a_cube_of_patches_and_of_an_open_tube():
     assert sorted(tube.wrap) == [False, True]
     marks = fields.overlays(tube)
     assert {name: len(edges) for name, edges in marks.items()} == {"boundary": 12, "seam": 5}
+
+
+def test_seams_where_a_grid_is_folded_or_closed():
+    pillow = surfaces.pillow_sphere()
+    for layout in ("grid", "staggered"):  # 16 edges along each fold, 8 where it wraps
+        mesh = pillow.sample((16, 8), layout)[0]
+        marks = fields.overlays(mesh)
+        assert list(marks) == ["seam"]
+        points = fields.drawn(mesh)[0][marks["seam"]].reshape(-1, 3)
+        z = points[:, 2]
+        assert len(np.unique(np.sort(points.reshape(-1, 6).round(9), axis=1), axis=0)) > 8
+        assert len(marks["seam"]) == 2 * 16 + 8 * (1 if layout == "grid" else 2)
+        assert np.abs(z).min() < 1e-12  # the folds lie on the equator
+    half = surfaces.hyperboloid().sample((8, 4), "staggered")[0]
+    marks = fields.overlays(half)
+    assert {name: len(edges) for name, edges in marks.items()} == {"boundary": 16, "seam": 8}
 
 
 def test_extraordinary_vertices_are_not_counted_on_the_boundary():
@@ -306,6 +353,8 @@ def test_figure_leaves_out_exact_zeros_and_can_be_saved(tmp_path):
     assert np.isnan(figure.axes[0].lines[0].get_ydata()).all()
     figure.savefig(tmp_path / "figure.png")
     assert (tmp_path / "figure.png").stat().st_size > 5000
+    with Image.open(BytesIO(figure._repr_png_())) as image:  # what a notebook shows
+        assert image.width > image.height > 400
 
 
 @pytest.fixture
@@ -451,12 +500,28 @@ def test_keys_and_the_list_choose_the_field(page):
     assert page.text("#name") == "error |H − exact| (1/length)"
     page.press(Keys.ARROW_LEFT)
     page.press(Keys.ARROW_LEFT)
-    assert page.all("#field")[0].get_attribute("value") == list(fields.FIELDS)[-1]
+    assert page.all("#field")[0].get_attribute("value") == "difference to cotan-6"
+    assert page.text("#name").startswith("difference to cotan-6, |H")
     page.all("#field")[0].send_keys("valence")
     assert page.text("#name").startswith("valence")
     page.press(Keys.TAB)
     page.press("o")
     assert [p.text for p in page.all("#legend .below")] == ["valence < 4"]
+
+
+def test_histograms_show_how_much_of_the_area_has_which_colour(page, ellipsoid):
+    def heights():
+        return [[b.rect["height"] for b in v.find_elements("css selector", ".bars > div")] for v in views]
+
+    views = page.all("#views > div")
+    assert heights() == [[], [], []]
+    page.press("h")
+    shown = fields.field(ellipsoid, "mean_curvature")
+    expected = np.array([shown.histogram(s, ellipsoid.areas) for s in ellipsoid.schemes])
+    found = np.array(heights())
+    np.testing.assert_allclose(found / found.max(), expected / expected.max(), atol=0.02)
+    page.press("h")
+    assert heights() == [[], [], []]
 
 
 def test_a_click_tells_the_value_in_every_scheme(page, ellipsoid, tmp_path):
@@ -482,6 +547,10 @@ def test_page_of_cells(browser, pillow, tmp_path):
     page.actions().move_to_element(page.all("#views > div")[0]).click().perform()
     kind, cell, *_ = page.text("#picked").replace(",", "").split()
     assert kind == "cell"
+    page.press("o")
+    assert [p.text for p in page.all("#legend .below")] == ["seam"]
+    for picture in page.pictures(tmp_path / "seam.png"):
+        assert np.sum(np.abs(picture - [0xE6, 0x9F, 0]).max(axis=2) < 12) > 200  # over the edges of cells
     name, value = page.text("#views > div").split(": ")
     expected = abs(pillow.errors[name].ravel()[int(cell)])
     assert float(value) == pytest.approx(expected, rel=1e-3)
@@ -644,6 +713,20 @@ def test_keys_and_buttons(window):
         assert what in window.becomes(shown=sorted(["edges", what]))["shown"]
         window.do("key", key)
         window.becomes(shown=["edges"])
+    before = window.picture()
+    window.click(523, 572)  # the button "histogram"
+    window.becomes(shown=["edges", "histogram"])
+    time.sleep(0.5)
+    strip = np.s_[365:399, 40:360]  # below the left surface
+    assert (window.picture()[strip] != before[strip]).any(axis=2).mean() > 0.02
+    window.do("key", "h")
+    window.becomes(shown=["edges"])
+    time.sleep(0.5)
+    assert (window.picture()[strip] == before[strip]).all()
+    window.do("key", "Left")
+    window.becomes(field="mean_curvature")
+    window.do("key", "Left")
+    window.becomes(field="difference to cotan-6")
     window.do("key", "m")
     window.becomes(shown=[])
 
@@ -699,7 +782,7 @@ def test_picking_shows_the_ring_in_both_views(window):
 def test_the_slider_refines(window):
     window.do("key", "o")
     window.becomes(shown=["edges", "overlays"])
-    window.drag((656, 575), (776, 575))
+    window.drag((670, 575), (776, 575))
     state = window.becomes(vertices=128**2)
     assert state["shown"] == ["edges", "overlays"]
     assert state["picked"] is None

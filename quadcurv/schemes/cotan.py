@@ -37,6 +37,11 @@ def cotan(valence: int = 6, area: str = "barycentric", diagonal: int = 0) -> Sch
     ------
     ValueError
         Any other valence, area or diagonal.
+
+    Notes
+    -----
+    With valence 6 the result depends on the vertex that each face begins with: turn a face over as
+    ``face[[0, 3, 2, 1]]`` to keep its diagonal.
     """
     for name, value, allowed in (
         ("valence", valence, VALENCES),

@@ -43,11 +43,10 @@ def _flaps(stencils: Stencils) -> tuple[Ints, scipy.sparse.csr_array]:
 
 
 def _flap_points(stencils: Stencils) -> tuple[Ints, scipy.sparse.csr_array, Floats]:
-    """Triangle corners as `_flaps`, and all points with the d of these corners appended."""
+    """Triangle corners as `_flaps`, and all points, relative to one, with the d of these corners appended."""
     corners, place = _flaps(stencils)
-    origin = stencils.points[0]
-    d = place @ (stencils.points - origin) + origin
-    return corners, place, np.concatenate((stencils.points, d))
+    x = stencils.points - stencils.points[0]
+    return corners, place, np.concatenate((x, place @ x))
 
 
 def _dual_areas(stencils: Stencils) -> Floats:
