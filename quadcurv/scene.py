@@ -11,6 +11,8 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     import pyvista as pv
 
+    from quadcurv.schemes import Fit, Scheme
+
 
 class PlotterComponent:
     """Error maps for scenes of one's own: ``plotter.quadcurv``.

@@ -69,6 +69,8 @@ def test_the_package_knows_nothing_of_scripts_and_tests(path):
 
 @pytest.mark.parametrize("path", MODULES, ids=lambda p: str(p.relative_to(PACKAGE)))
 def test_heavy_libraries_are_imported_inside_functions(path):
+    if part(path) == "figures":  # the top floor, and itself imported inside functions
+        return
     assert not {n.split(".")[0] for n in module_level_imports(path)} & HEAVY
 
 
