@@ -241,7 +241,7 @@ def peer_jobs(points: Floats, faces: NDArray[np.int64]) -> Iterator[tuple[str, J
                 ),
             )
         try:
-            import robust_laplacian  # type: ignore[import-untyped]
+            import robust_laplacian
         except ImportError:
             pass
         else:
