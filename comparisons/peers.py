@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import contextlib
 import importlib
-import importlib.util
 import multiprocessing
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -171,8 +170,13 @@ class Method:
 
     @property
     def installed(self) -> bool:
-        """Whether its library and what it needs can be imported."""
-        return all(importlib.util.find_spec(name) for name in (self.library, *self.needs))
+        """Whether its libraries can be imported; pymeshlab, say, may lack a system library."""
+        try:
+            for name in (self.library, *self.needs):
+                importlib.import_module(name)
+        except ImportError:
+            return False
+        return True
 
 
 PEERS = (
