@@ -14,6 +14,7 @@ from quadcurv.interop import as_mesh
 from quadcurv.mesh import Floats, QuadGrid, QuadMesh, StaggeredGrid, Stencils
 from quadcurv.schemes import Curvatures, Fit, Scheme, as_scheme
 from quadcurv.schemes.angle_defect import angle_defect
+from quadcurv.schemes.diamond import without_infinity
 
 
 def mean_curvature(
@@ -213,15 +214,10 @@ def stiffness_matrix(
     """
     scheme, stencils = _as_laplacian(scheme), as_mesh(mesh).stencils()
     if scheme.stiffness is not None:
-        stiffness = scheme.stiffness(stencils, out)
-    elif out is not None:
+        return scheme.stiffness(stencils, out)
+    if out is not None:
         raise ValueError(f"out: {scheme.name} assembles a new matrix each time")
-    else:
-        stiffness = scheme.assemble(stencils)[0]
-    with np.errstate(invalid="ignore"):
-        if not np.isfinite(stiffness.data.sum()):
-            stiffness.data[~np.isfinite(stiffness.data)] = np.nan
-    return stiffness
+    return without_infinity(scheme.assemble(stencils)[0])
 
 
 def mass_matrix(mesh: Any, scheme: str | Scheme | Fit = "finite_volume") -> scipy.sparse.dia_array:

@@ -129,6 +129,11 @@ class Stencils:
         return topology.rings(self.faces, *topology.corners_by_vertex(self.faces, len(self.points)))
 
     @cached_property
+    def irregular(self) -> NDArray[np.int64]:
+        """Vertices with a stencil that have no such ring."""
+        return np.flatnonzero(self.ring[: self.n, 0] < 0)
+
+    @cached_property
     def ring_areas(self) -> Floats:
         """(n, 3) float64: half the vector area of each ring polygon; it points along the normal."""
         from quadcurv.kernels import diamond
@@ -280,7 +285,7 @@ class QuadMesh:
 
         closed = self._kind == topology.INTERIOR
         stencils = Stencils(self.points, self.faces, (len(self.points),), closed, self.orientable)
-        stencils.__dict__["ring"] = self._ring
+        stencils.__dict__.update(ring=self._ring, irregular=self._others)
         return stencils
 
     @staticmethod
@@ -719,8 +724,7 @@ def _checked_points(points: ArrayLike, name: str, shape: tuple[Any, ...]) -> Flo
     with np.errstate(over="ignore"):  # of long doubles; they are found below
         array = np.ascontiguousarray(given, dtype=np.float64).view()
     array.flags.writeable = False
-    with np.errstate(invalid="ignore"):
-        extremes = (array.min(), array.max()) if array.size else (0.0, 0.0)
+    extremes = _extremes(array)
     if not np.isfinite(extremes).all():  # both are NaN if any entry is
         first, count = _first_and_count(~np.isfinite(array.reshape(-1, 3)).all(axis=1))
         where = np.unravel_index(first, array.shape[:-1])
@@ -739,6 +743,24 @@ def _checked_points(points: ArrayLike, name: str, shape: tuple[Any, ...]) -> Flo
         ):
             raise MeshError(f"{name}: all within {1 / _LARGEST:g} of each other, where areas vanish")
     return array
+
+
+def _extremes(array: Floats) -> tuple[float, float]:
+    """Least and largest entry, both NaN if any entry is; 0 of an empty array."""
+    from quadcurv.kernels import parallel
+
+    if array.size == 0:
+        return 0.0, 0.0
+    found = []
+
+    def look(start: int, stop: int) -> None:
+        part = array[start:stop]
+        with np.errstate(invalid="ignore"):
+            found.append((part.min(), part.max()))
+
+    parallel.over(look, len(array), array.size // 3)
+    low, high = np.transpose(found)
+    return low.min(), high.max()
 
 
 def _checked_wrap(wrap: Sequence[bool]) -> tuple[bool, bool]:

@@ -31,7 +31,7 @@ STRIDE = WIDTH + 16
 FIRST = np.uint64(8)  # place of the first vertex in a plane, its left neighbour before it
 ONE, TWO, THREE = np.uint64(1), np.uint64(2), np.uint64(3)
 Y, Z, A = np.uint64(STRIDE), np.uint64(2 * STRIDE), np.uint64(3 * STRIDE)
-SIDE, POINT = np.uint64(BLOCK), np.uint64(3 * BLOCK)
+SIDE, TWICE, POINT = np.uint64(BLOCK), np.uint64(2 * BLOCK), np.uint64(3 * BLOCK)
 
 
 @inlined
@@ -339,17 +339,24 @@ def cells(points, beyond, beside, halo, dual, liu, Hn, H, normal, area, start, s
 
 
 @inlined
-def into(x, k, a, d, b):
-    """Half flux into vertex k of a block from its corner with planes a, d and b."""
-    gx, gy, gz, _, _, _, length = flux(
-        x[d + k] - x[k],
-        x[d + k + SIDE] - x[k + SIDE],
-        x[d + k + SIDE + SIDE] - x[k + SIDE + SIDE],
-        x[b + k] - x[a + k],
-        x[b + k + SIDE] - x[a + k + SIDE],
-        x[b + k + SIDE + SIDE] - x[a + k + SIDE + SIDE],
-    )
-    return gx, gy, gz, length
+def corner(x, k, a, d, b):
+    """Flux v x n of vertex k of a block in its corner (a, d, b), not divided by 2 |n| yet, and |n|."""
+    ux, uy, uz = x[d + k] - x[k], x[d + k + SIDE] - x[k + SIDE], x[d + k + TWICE] - x[k + TWICE]
+    vx, vy, vz = x[b + k] - x[a + k], x[b + k + SIDE] - x[a + k + SIDE], x[b + k + TWICE] - x[a + k + TWICE]
+    nx, ny, nz = uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx
+    length = sqrt(nx * nx + ny * ny + nz * nz)
+    return vy * nz - vz * ny, vz * nx - vx * nz, vx * ny - vy * nx, length
+
+
+@inlined
+def two_corners(x, k, a, d, b, e, c):
+    """Half fluxes into vertex k from its corners (a, d, b) and (b, e, c), and |n| of both: one division."""
+    px, py, pz, p = corner(x, k, a, d, b)
+    qx, qy, qz, q = corner(x, k, b, e, c)
+    product = p * q
+    scale = 0.5 / product if product > 0 else nan
+    s, t = q * scale, p * scale
+    return s * px + t * qx, s * py + t * qy, s * pz + t * qz, p + q
 
 
 @helper
@@ -358,23 +365,21 @@ def block(x, size, at, liu, Hn, H, normal, area):
     a0, d0, a1, d1 = np.uint64(1) * POINT, np.uint64(2) * POINT, np.uint64(3) * POINT, np.uint64(4) * POINT
     a2, d2, a3, d3 = np.uint64(5) * POINT, np.uint64(6) * POINT, np.uint64(7) * POINT, np.uint64(8) * POINT
     for k in range(np.uint64(0), size):
-        px, py, pz, p = into(x, k, a0, d0, a1)
-        qx, qy, qz, q = into(x, k, a1, d1, a2)
-        rx, ry, rz, r = into(x, k, a2, d2, a3)
-        sx, sy, sz, s = into(x, k, a3, d3, a0)
+        px, py, pz, p = two_corners(x, k, a0, d0, a1, d1, a2)
+        qx, qy, qz, q = two_corners(x, k, a2, d2, a3, d3, a0)
         finish(
             at + k,
-            (px + qx) + (rx + sx),
-            (py + qy) + (ry + sy),
-            (pz + qz) + (rz + sz),
+            px + qx,
+            py + qy,
+            pz + qz,
             x[a2 + k] - x[a0 + k],
             x[a2 + k + SIDE] - x[a0 + k + SIDE],
-            x[a2 + k + SIDE + SIDE] - x[a0 + k + SIDE + SIDE],
+            x[a2 + k + TWICE] - x[a0 + k + TWICE],
             x[a3 + k] - x[a1 + k],
             x[a3 + k + SIDE] - x[a1 + k + SIDE],
-            x[a3 + k + SIDE + SIDE] - x[a1 + k + SIDE + SIDE],
+            x[a3 + k + TWICE] - x[a1 + k + TWICE],
             liu,
-            (p + q) + (r + s),
+            p + q,
             Hn,
             H,
             normal,
@@ -389,7 +394,7 @@ def gather_ring(points, ring, v, x, k):
     for j in range(9):
         i = THREE * np.uint64(ring[v, j - 1] if regular and j > 0 else v)
         at = np.uint64(j) * POINT + k
-        x[at], x[at + SIDE], x[at + SIDE + SIDE] = points[i], points[i + ONE], points[i + TWO]
+        x[at], x[at + SIDE], x[at + TWICE] = points[i], points[i + ONE], points[i + TWO]
 
 
 @kernel
@@ -417,7 +422,8 @@ def rings(points, ring, liu, Hn, H, normal, area, start, stop):
 def conductance(ux, uy, uz, vx, vy, vz):
     """K_00 and K_01 of a quad: K (u, v) are the half fluxes into its first two vertices."""
     nx, ny, nz = uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx
-    scale = 0.5 / sqrt(nx * nx + ny * ny + nz * nz)
+    length = sqrt(nx * nx + ny * ny + nz * nz)
+    scale = 0.5 / length if length > 0 else nan
     return scale * (vx * vx + vy * vy + vz * vz), -scale * (ux * vx + uy * vy + uz * vz)
 
 
@@ -436,10 +442,10 @@ def weights(x, size, row):
             own, cross_ = conductance(
                 x[d + k] - x[k],
                 x[d + k + SIDE] - x[k + SIDE],
-                x[d + k + SIDE + SIDE] - x[k + SIDE + SIDE],
+                x[d + k + TWICE] - x[k + TWICE],
                 x[b + k] - x[a + k],
                 x[b + k + SIDE] - x[a + k + SIDE],
-                x[b + k + SIDE + SIDE] - x[a + k + SIDE + SIDE],
+                x[b + k + TWICE] - x[a + k + TWICE],
             )
             row[k] += own
             row[to_d + k] -= own
@@ -449,14 +455,14 @@ def weights(x, size, row):
 
 @helper
 def ranks(column, size, rank):
-    """Place of each of the nine columns in its row when sorted, by counting the smaller ones."""
+    """Place of each of the nine columns in its row when sorted: how many are smaller."""
     for i in range(9):
-        for j in range(i):
-            at_i, at_j = np.uint64(i) * SIDE, np.uint64(j) * SIDE
-            for k in range(np.uint64(0), size):
-                smaller = np.int32(column[at_j + k] < column[at_i + k])
-                rank[at_i + k] += smaller
-                rank[at_j + k] += np.int32(1) - smaller
+        at = np.uint64(i) * SIDE
+        for k in range(np.uint64(0), size):
+            smaller = np.int32(0)
+            for j in range(9):
+                smaller += np.int32(column[np.uint64(j) * SIDE + k] < column[at + k])
+            rank[at + k] = smaller
 
 
 @kernel
@@ -483,7 +489,7 @@ def ring_stiffness(points, ring, indptr, indices, data, start, stop):
             column[k] = begin + k
             for j in range(8):
                 column[BLOCK * (j + 1) + k] = ring[begin + k, j]
-        row[:], rank[:] = 0, 0
+        row[:] = 0
         weights(x, size, row)
         ranks(column, size, rank)
         for v in range(begin, end):

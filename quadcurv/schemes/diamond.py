@@ -44,21 +44,20 @@ def stiffness(
     """
     from quadcurv.kernels import diamond, parallel, topology
 
-    n, p, ring = stencils.n, len(stencils.points), stencils.ring
-    others = np.flatnonzero(ring[:n, 0] < 0)
-    indptr, rows = 9 * np.arange(n + 1), None
+    n, p, others = stencils.n, len(stencils.points), stencils.irregular
+    indptr, rows = np.arange(0, 9 * n + 1, 9), None
     if others.size:
         size = np.full(n, 9)
         vertices, faces = topology.part_around(stencils.faces, others, p, 2)
         closed = np.zeros(vertices.size, bool)
         part = Stencils(stencils.points[vertices], faces, (vertices.size,), closed, stencils.orientable)
-        rows = scipy.sparse.csr_array(general(part)[: others.size])
+        rows = scipy.sparse.csr_array(without_infinity(general(part))[: others.size])
         rows = scipy.sparse.csr_array((rows.data, vertices[rows.indices], rows.indptr), (others.size, p))
         rows.sort_indices()
         size[others] = np.diff(rows.indptr)
         np.cumsum(size, out=indptr[1:])
     if indptr[-1] > np.iinfo(np.int32).max:
-        return general(stencils)[:n]
+        return without_infinity(general(stencils)[:n])
     indptr = indptr.astype(np.int32)
     if out is None:
         arrays = np.empty(indptr[-1]), np.empty(indptr[-1], np.int32), indptr
@@ -68,9 +67,18 @@ def stiffness(
     if rows is not None:
         place = np.repeat(indptr[others] - rows.indptr[:-1], np.diff(rows.indptr)) + np.arange(rows.nnz)
         out.indices[place], out.data[place] = rows.indices, rows.data
-    kernel = partial(diamond.ring_stiffness, stencils.points.ravel(), ring, indptr, out.indices, out.data)
+    points, ring = stencils.points.ravel(), stencils.ring
+    kernel = partial(diamond.ring_stiffness, points, ring, indptr, out.indices, out.data)
     parallel.over(kernel, n, n, diamond.BLOCK)
     return out
+
+
+def without_infinity(matrix: scipy.sparse.csr_array) -> scipy.sparse.csr_array:
+    """The matrix itself, NaN wherever it is not finite."""
+    with np.errstate(invalid="ignore"):
+        if not np.isfinite(matrix.data.sum()):
+            matrix.data[~np.isfinite(matrix.data)] = np.nan
+    return matrix
 
 
 def quad_stiffness(stencils: Stencils) -> scipy.sparse.csr_array:
