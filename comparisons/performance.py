@@ -19,7 +19,7 @@ from functools import partial
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from types import FunctionType
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,6 +31,8 @@ from quadcurv.schemes.diamond import quad_stiffness
 
 Floats = NDArray[np.float64]
 Job = Callable[[], Any]
+Jobs = dict[str, Job]
+Key = TypeVar("Key", str, tuple[int, str])
 REPORT = Path(__file__).with_name("PERFORMANCE.md")
 SIZES = (256, 1024, 2048)  # vertices in each direction: 65 thousand, 1 and 4 million
 PEERS = ("libigl", "vtk", "pymeshlab", "robust-laplacian", "scipy", "numpy", "numba")
@@ -150,7 +152,7 @@ def operations() -> dict[str, int]:
     return {**parts, "all": sum(parts.values())}
 
 
-def rounds(jobs: Mapping[str, Job], count: int) -> dict[str, Floats]:
+def rounds(jobs: Mapping[Key, Job], count: int) -> dict[Key, Floats]:
     """Wall time of each job in each round; all run once beforehand."""
     for job in jobs.values():
         job()
@@ -170,22 +172,21 @@ def ratio(name: str, against: str, times: Mapping[str, Floats], small: bool, **r
     return Ratio(name, against, low=low, median=median, high=high, **rest)
 
 
-def grid_jobs(n: int) -> dict[str, Job]:
-    """The grid passes, a copy of the bytes they read and write, and the scheme by numpy."""
+def grid_jobs(n: int) -> tuple[Jobs, Jobs]:
+    """The grid passes and a copy of the bytes they read and write, by our threads; the scheme by numpy."""
     points = torus(n)
-    closed, open_ = qc.QuadGrid(points, (True, True)), qc.QuadGrid(points[:, :, :])
+    closed, open_ = qc.QuadGrid(points, (True, True)), qc.QuadGrid(points)
     out = {"mean_curvature_normal": np.empty_like(points)}
     target = out["mean_curvature_normal"]
 
     def copy() -> None:
         parallel.over(lambda i, j: np.copyto(target[i:j], points[i:j]), n, n * n)
 
-    jobs: dict[str, Job] = {"copy": copy}
+    ours: Jobs = {"copy": copy}
     for scheme in ("finite_volume", "liu"):
         for kind, grid in (("wrapped", closed), ("open", open_)):
-            jobs[f"{scheme}, {kind} grid"] = partial(qc.evaluate, grid, scheme=scheme, out=out)
-    jobs["numpy"] = lambda: numpy_finite_volume(points)
-    return jobs
+            ours[f"{scheme}, {kind} grid"] = partial(qc.evaluate, grid, scheme=scheme, out=out)
+    return ours, {"numpy": lambda: numpy_finite_volume(points)}
 
 
 def face_lists(n: int) -> dict[str, tuple[Floats, NDArray[np.int64]]]:
@@ -247,11 +248,11 @@ def peer_jobs(points: Floats, faces: NDArray[np.int64]) -> Iterator[tuple[str, J
         else:
             yield "robust_laplacian", lambda: robust_laplacian.mesh_laplacian(points, cut)[0] @ points
     if n <= 2**16:
-        yield "igl.principal_curvature", lambda: igl.principal_curvature(points, cut)
+        yield "igl.principal_curvature", lambda: igl.principal_curvature(points, cut, radius=2)
 
 
-def face_jobs(n: int) -> dict[str, Job]:
-    """Face lists, once and repeatedly, in natural and in shuffled order; stiffness matrices."""
+def face_jobs(n: int) -> tuple[Jobs, Jobs]:
+    """Face lists, once and repeatedly, in natural and in shuffled order, stiffness matrices; peers."""
     import igl
     import scipy.sparse
 
@@ -259,29 +260,51 @@ def face_jobs(n: int) -> dict[str, Job]:
         return qc.mean_curvature_normal(mesh.with_points(points), scheme)
 
     lists = face_lists(n)
-    points, faces = lists["natural"]
-    cut = triangles(faces)
-    jobs: dict[str, Job] = {}
+    ours: Jobs = {}
     for scheme in ("finite_volume", "liu"):
         for kind, (x, f) in lists.items():
             mesh = qc.QuadMesh(x, f)
             moved(mesh, x, scheme)
-            jobs[f"{scheme}, repeated, {kind}"] = partial(moved, mesh, x, scheme)
+            ours[f"{scheme}, repeated, {kind}"] = partial(moved, mesh, x, scheme)
     for kind, given in lists.items():
-        jobs[f"finite_volume, one call, {kind}"] = partial(qc.mean_curvature_normal, given)
-    jobs |= peer_jobs(points, faces)
+        ours[f"finite_volume, one call, {kind}"] = partial(qc.mean_curvature_normal, given)
 
+    points, faces = lists["natural"]
+    cut = triangles(faces)
+    peers = dict(peer_jobs(points, faces))
+    if "igl.principal_curvature" in peers:
+        ours["jet, one call"] = partial(qc.principal_curvatures, (points, faces))
+        ours["jet, grid"] = partial(qc.principal_curvatures, qc.QuadGrid(torus(n), (True, True)))
     mesh = qc.QuadMesh(points, faces)
     stencils = mesh.stencils()
     S = qc.stiffness_matrix(mesh)
-    jobs["stiffness"] = lambda: qc.stiffness_matrix(mesh)
-    jobs["stiffness in place"] = lambda: qc.stiffness_matrix(mesh, out=S)
-    jobs["scipy assembly"] = lambda: quad_stiffness(stencils)
+    ours["stiffness"] = lambda: qc.stiffness_matrix(mesh)
+    ours["stiffness in place"] = lambda: qc.stiffness_matrix(mesh, out=S)
     local = np.ones(16 * len(faces))
     i, j = np.repeat(faces, 4, axis=1).ravel(), np.tile(faces, (1, 4)).ravel()
-    jobs["scipy coo->csr"] = lambda: scipy.sparse.csr_array((local, (i, j)), shape=S.shape)
-    jobs["igl.cotmatrix"] = lambda: igl.cotmatrix(points, cut)
-    return jobs
+    peers["scipy coo->csr"] = lambda: scipy.sparse.csr_array((local, (i, j)), shape=S.shape)
+    if len(points) <= 2**20:
+        peers["scipy assembly"] = lambda: quad_stiffness(stencils)
+    peers["igl.cotmatrix"] = lambda: igl.cotmatrix(points, cut)
+    return ours, peers
+
+
+def on_threads(ours: Jobs, peers: Jobs, count: int) -> dict[int, dict[str, Floats]]:
+    """Times by number of threads: ours on one and on two, the peers as they are, in common rounds."""
+
+    def on(threads: int, job: Job) -> Job:
+        def run() -> None:
+            qc.set_threads(threads)
+            job()
+
+        return run
+
+    times = rounds(
+        {(t, name): on(t, job) for name, job in ours.items() for t in (1, 2)}
+        | {(0, name): job for name, job in peers.items()},
+        count,
+    )
+    return {t: {name: taken for (s, name), taken in times.items() if s in (0, t)} for t in (1, 2)}
 
 
 def of_grids(n: int, threads: int, times: dict[str, Floats]) -> Iterator[Ratio]:
@@ -304,9 +327,10 @@ def of_faces(n: int, threads: int, times: dict[str, Floats]) -> Iterator[Ratio]:
         return {**rest, "must": must, "aim": aim} if n >= 256 and threads == 2 else rest
 
     goals = {"libigl": goal(35, 80), "VTK": goal(28, 40), "MeshLab": goal(50, 90)}
+    peers = ("libigl", "VTK", "MeshLab", "robust_laplacian")
     for scheme in ("finite_volume", "liu"):
         natural, shuffled = (f"{scheme}, repeated, {kind}" for kind in ("natural", "shuffled"))
-        for peer in ("libigl", "VTK", "MeshLab", "robust_laplacian", "igl.principal_curvature"):
+        for peer in peers:
             if peer in times:
                 yield ratio(natural, peer, times, False, **goals.get(peer, rest))
         yield ratio(shuffled, natural, times, True, **goal(3, 1.5))
@@ -314,9 +338,13 @@ def of_faces(n: int, threads: int, times: dict[str, Floats]) -> Iterator[Ratio]:
     yield ratio(once + "natural", "libigl", times, False, **goal(10, 20))
     yield ratio(once + "shuffled", once + "natural", times, True, **rest)
     yield ratio("stiffness", "scipy coo->csr", times, False, **goal(5, 6))
-    yield ratio("stiffness", "scipy assembly", times, False, **rest)
+    if "scipy assembly" in times:
+        yield ratio("stiffness", "scipy assembly", times, False, **rest)
     yield ratio("stiffness", "igl.cotmatrix", times, False, **goal(20, 30))
     yield ratio("stiffness in place", "igl.cotmatrix", times, False, **rest)
+    for name in ("jet, one call", "jet, grid"):
+        if name in times:
+            yield ratio(name, "igl.principal_curvature", times, False, **goal(8, 8))
 
 
 MEMORY = """
@@ -390,17 +418,17 @@ def growth(times: Mapping[int, Mapping[str, Floats]]) -> dict[str, float]:
 
 
 def measure(quick: bool) -> tuple[list[Ratio], dict[str, dict[int, dict[str, Floats]]], dict[str, float]]:
-    """All ratios; times of the grid and of the face-list table by size, with all threads; bytes a vertex."""
+    """All ratios; times of the grid and of the face-list table by size, two threads; bytes a vertex."""
     sizes, count = ((64, 128), 2) if quick else (SIZES, 7)
     times: dict[str, dict[int, dict[str, Floats]]] = {"grids": {}, "faces": {}}
     ratios: list[Ratio] = []
     try:
         for n in sizes:
+            grids, faces = on_threads(*grid_jobs(n), 3 * count), on_threads(*face_jobs(n), count)
+            times["grids"][n * n], times["faces"][n * n] = grids[2], faces[2]
             for threads in (1, 2):
-                qc.set_threads(threads)
-                grids, faces = rounds(grid_jobs(n), 3 * count), rounds(face_jobs(n), count)
-                times["grids"][n * n], times["faces"][n * n] = grids, faces
-                ratios += [*of_grids(n, threads, grids), *of_faces(n, threads, faces)]
+                ratios += [*of_grids(n, threads, grids[threads]), *of_faces(n, threads, faces[threads])]
+        qc.set_threads(2)
         n = sizes[-1] if quick else 1024
         used, peak = memory(n) if sys.platform == "linux" else (None, {})
         ratios += [r for r in (used, first_call(3 if quick else 9)) if r]

@@ -251,6 +251,20 @@ def test_after_a_fork_and_from_other_threads():
             np.testing.assert_array_equal(other, H)
 
 
+@pytest.mark.filterwarnings("default")
+def test_inside_dask_workers():
+    """Tasks of two threads a process, each of which calls our own threads."""
+    from distributed import Client, LocalCluster
+
+    grid = QuadGrid(rough((600, 500)))
+    H = qc.mean_curvature(grid)
+    cluster = LocalCluster(2, threads_per_worker=2, processes=True, dashboard_address=None)
+    with cluster, Client(cluster) as client:
+        tasks = [client.submit(qc.mean_curvature, grid, pure=False) for _ in range(8)]
+        for other in client.gather(tasks):
+            np.testing.assert_array_equal(other, H)
+
+
 def test_number_of_threads_from_the_environment(monkeypatch):
     monkeypatch.setenv("QUADCURV_NUM_THREADS", "3")
     assert parallel.threads() == 3
