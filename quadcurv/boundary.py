@@ -265,36 +265,40 @@ def _ghosted_cells(grid: StaggeredGrid) -> Stencils:
 
 
 class Ghosts(NamedTuple):
-    """The ghost layer of a face list, as far as its connectivity settles it.
+    """The ghost layers of a face list, as far as its connectivity settles them.
 
     Attributes
     ----------
-    lines : (g, DEGREE + 1) int64
-        The vertices that each ghost beside an edge is extrapolated from.
-    across : (2 h, DEGREE + 1) int64
-        The ghosts of two sides that each ghost across a corner is the mean extrapolation of.
+    layers : int
+    lines : (g, degree + 1) int64
+        The vertices that the ghosts beside an edge, `layers` of them, are extrapolated from.
+    across : (2 h, degree + 1) int64
+        The lines of two sides whose ghosts those across a corner, `layers` squared, are the mean
+        extrapolation of.
     quads : (k, 4) int32
-        Ghost quads over the n vertices, the g ghosts and the h across corners.
+        Ghost quads over the n vertices, the ghosts of the g lines and those across h corners.
     closed : (n,) bool
         Whether the ring is closed with them.
     """
 
+    layers: int
     lines: Indices
     across: Indices
     quads: NDArray[np.int32]
     closed: Bools
 
 
-def ghosts(mesh: Stencils) -> Ghosts:
-    """Find a ghost quad beyond every boundary edge whose strip is long enough, see :func:`stencils`."""
+def ghosts(mesh: Stencils, degree: int = DEGREE, layers: int = 1) -> Ghosts:
+    """Find ghost quads beyond every boundary edge whose strip is long enough, see :func:`stencils`."""
     n = mesh.n
-    rails, slot, valence, n_edges = _strips(mesh)
+    rails, slot, valence, n_edges = _strips(mesh, degree)
     if len(rails) == 0:
-        none = np.empty((0, DEGREE + 1), np.int64)
-        return Ghosts(none, none, np.empty((0, 4), np.int32), mesh.closed)
-    # One ghost for each rail X_0, X_1, ...: at a side the strips to the left and right share it.
-    _, first, ghost = np.unique(rails[:, 0] * n + rails[:, 1], return_index=True, return_inverse=True)
-    quads = np.concatenate((n + ghost.reshape(-1, 2), rails[:, 0].reshape(-1, 2)[:, ::-1]), axis=1)
+        none = np.empty((0, degree + 1), np.int64)
+        return Ghosts(layers, none, none, np.empty((0, 4), np.int32), mesh.closed)
+    # One line for each rail X_0, X_1, ...: at a side the strips to the left and right share it.
+    _, first, line = np.unique(rails[:, 0] * n + rails[:, 1], return_index=True, return_inverse=True)
+    outward = np.concatenate((rails[:, :1], n + layers * line[:, None] + np.arange(layers)), axis=1)
+    quads = _block_quads(outward.reshape(-1, 2, layers + 1).transpose(0, 2, 1)[..., ::-1], slot)
 
     both = np.bincount(rails[:, 0], minlength=n) == 2
     side = both & (valence == 2) & (n_edges == 2)
@@ -302,28 +306,30 @@ def ghosts(mesh: Stencils) -> Ghosts:
     # At a corner one strip begins and another ends: the rail of each runs along the edges of the other.
     at = np.flatnonzero(corner[rails[:, 0]])
     at = at[np.lexsort((at % 2, rails[at, 0]))]
-    beyond, known = _beside(rails, ghost, rails[at], n)
+    across, known = _beside(rails, line, rails[at], n)
     known = known[::2] & known[1::2]
-    beyond, (begin, end) = beyond[np.repeat(known, 2)], at.reshape(-1, 2)[known].T
+    across, (begin, end) = across[np.repeat(known, 2)], at.reshape(-1, 2)[known].T
     c = rails[begin, 0]
-    number = n + len(first) + np.arange(c.size)
-    corner_quads = np.stack((number, n + ghost[begin], c, n + ghost[end]), axis=1)
-    # Each begins where its face does, moved outward: a fixed diagonal goes on in the ghosts.
-    quads = np.concatenate((quads, corner_quads), dtype=np.int32)
-    first_slot = np.concatenate((slot, slot[begin // 2]))
-    quads = np.take_along_axis(quads, (np.arange(4) - first_slot[:, None]) % 4, axis=1)
+    block = np.empty((c.size, layers + 1, layers + 1), np.int64)
+    block[:, :, 0], block[:, 0, :] = outward[begin], outward[end]
+    number = n + layers * len(first) + np.arange(c.size * layers**2)
+    block[:, 1:, 1:] = number.reshape(-1, layers, layers)
+    corner_quads = _block_quads(block, slot[begin // 2])
+
     closed = mesh.closed | side
     closed[c] = True
-    return Ghosts(rails[first], beyond, quads, closed)
+    return Ghosts(layers, rails[first], across, np.concatenate((quads, corner_quads)), closed)
 
 
 def with_ghosts(mesh: Stencils, layer: Ghosts) -> tuple[Stencils, Floats]:
-    """Stencils with the ghost layer at its positions; how rough the extrapolation is (p,), 0 inside."""
-    beside, rough = _extrapolated(mesh.points[layer.lines])
-    across, rough_across = _extrapolated(beside[layer.across])
-    points = np.concatenate((mesh.points, beside, (across[::2] + across[1::2]) / 2))
+    """Stencils with ghost layers at their positions; how rough the extrapolation is (p,), 0 inside."""
+    beside, rough = _extrapolated(mesh.points[layer.lines], layer.layers)
+    across, rough_across = _extrapolated(beside[layer.across], layer.layers)
+    corner = (across[::2] + across[1::2].swapaxes(1, 2)) / 2
+    rough_corner = np.maximum(rough_across[::2, None, :], rough_across[1::2, :, None])
+    points = np.concatenate((mesh.points, beside.reshape(-1, 3), corner.reshape(-1, 3)))
     faces = np.concatenate((mesh.faces, layer.quads))
-    rough = np.concatenate((np.zeros(mesh.n), rough, np.maximum(rough_across[::2], rough_across[1::2])))
+    rough = np.concatenate((np.zeros(mesh.n), np.repeat(rough, layer.layers), rough_corner.ravel()))
     return Stencils(points, faces, mesh.shape, layer.closed, mesh.orientable), rough
 
 
@@ -337,30 +343,43 @@ def _roughness(mesh: Stencils) -> tuple[Stencils, Floats]:
     return treated, np.where(layer.closed & np.isfinite(worst), worst, np.nan)
 
 
-def _extrapolated(lines: Floats) -> tuple[Floats, Floats]:
-    """X_-1 of lines X_0, X_1, ... (k, DEGREE + 1, 3), and their last difference over their first edge."""
+def _block_quads(blocks: Indices, slot: Indices) -> NDArray[np.int32]:
+    """Quads of blocks (k, p, q) of vertices, outward from [0, 0].
+
+    Each begins where the block's face does, moved outward: a fixed diagonal goes on in the ghosts.
+    """
+    b = blocks.astype(np.int32)
+    quads = np.stack((b[:, 1:, 1:], b[:, 1:, :-1], b[:, :-1, :-1], b[:, :-1, 1:]), axis=-1)
+    turned = (np.arange(4) - slot[:, None]) % 4
+    return np.take_along_axis(quads, turned[:, None, None], axis=3).reshape(-1, 4)
+
+
+def _extrapolated(lines: Floats, layers: int) -> tuple[Floats, Floats]:
+    """X_-1, X_-2, ... of lines X_0, X_1, ... (k, degree + 1, ..., 3), and how rough these are (k, ...)."""
+    degree = lines.shape[1] - 1
     x = lines - lines[:, :1]  # an offset costs no digits
-    difference = np.linalg.norm(np.diff(x, DEGREE, axis=1)[:, 0], axis=1)
-    edge = np.linalg.norm(x[:, 1], axis=1)
+    difference = np.linalg.norm(np.diff(x, degree, axis=1)[:, 0], axis=-1)
+    edge = np.linalg.norm(x[:, 1], axis=-1)
     rough = np.divide(difference, edge, out=np.full(edge.shape, np.inf), where=edge > 0)
-    return lines[:, 0] + np.einsum("k,lkx->lx", _weights(DEGREE), x), rough
+    beyond = [np.einsum("k,lk...->l...", _weights(degree, m + 1), x) for m in range(layers)]
+    return lines[:, :1] + np.stack(beyond, axis=1), rough
 
 
-def _beside(rails: Indices, ghost: Indices, lines: Indices, n: int) -> tuple[Indices, Bools]:
-    """Ghosts of the vertices along `lines`, as the strips between them have them, and whether all exist."""
+def _beside(rails: Indices, line: Indices, along: Indices, n: int) -> tuple[Indices, Bools]:
+    """Lines of ghosts beside vertices `along` a side, as the strips there have them; whether all exist."""
     key = rails[:, 0] * n + rails[:, 0].reshape(-1, 2)[:, ::-1].ravel()
     order = np.argsort(key)
-    wanted = lines * n + lines[:, [1, *range(DEGREE)]]
+    wanted = along * n + along[:, [1, *range(along.shape[1] - 1)]]
     place = order[np.minimum(np.searchsorted(key, wanted, sorter=order), key.size - 1)]
-    return ghost[place], (key[place] == wanted).all(axis=1)
+    return line[place], (key[place] == wanted).all(axis=1)
 
 
-def _strips(mesh: Stencils) -> tuple[Indices, Indices, Indices, Indices]:
+def _strips(mesh: Stencils, degree: int) -> tuple[Indices, Indices, Indices, Indices]:
     """Strips of quads inward from boundary edges, straight through regular vertices.
 
     Returns
     -------
-    rails : (2 k, DEGREE + 1) int64
+    rails : (2 k, degree + 1) int64
         The two sides of each strip; its first face runs from the first one to the second.
     slot : (k,) int64
         Where the boundary edge begins in that face.
@@ -388,13 +407,13 @@ def _strips(mesh: Stencils) -> tuple[Indices, Indices, Indices, Indices]:
     kept &= faces[f, 3] >= 0
     f, i, j = f[kept], i[kept], j[kept]
     slot = i
-    strips = np.empty((f.size, 2, DEGREE + 1), np.int64)
+    strips = np.empty((f.size, 2, degree + 1), np.int64)
     strips[:, 0, 0], strips[:, 1, 0] = faces[f, i], faces[f, j]
-    for k in range(1, DEGREE + 1):
+    for k in range(1, degree + 1):
         i, j = (2 * i - j) % 4, (2 * j - i) % 4  # across the quad, where the edge begins and ends
         u, v = faces[f, i], faces[f, j]
         strips[:, 0, k], strips[:, 1, k] = u, v
-        if k == DEGREE:
+        if k == degree:
             break
         around = corners[np.minimum(indptr[u, None] + np.arange(4), indptr[u + 1, None] - 1)] // 4
         beyond = (faces[around] == v[:, None, None]).any(axis=2) & (around != f[:, None])
@@ -402,4 +421,4 @@ def _strips(mesh: Stencils) -> tuple[Indices, Indices, Indices, Indices]:
         strips, slot, u, v = strips[kept], slot[kept], u[kept], v[kept]
         f = around[kept, beyond[kept].argmax(axis=1)]
         i, j = (faces[f] == u[:, None]).argmax(axis=1), (faces[f] == v[:, None]).argmax(axis=1)
-    return strips.reshape(-1, DEGREE + 1), slot, valence, n_edges
+    return strips.reshape(-1, degree + 1), slot, valence, n_edges

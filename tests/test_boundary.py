@@ -18,7 +18,15 @@ from quadcurv import (
     surfaces,
     vertex_normals,
 )
-from quadcurv.boundary import EXTRAPOLATED, INTERIOR, OPEN, boundary_treatment, ghost_layer
+from quadcurv.boundary import (
+    EXTRAPOLATED,
+    INTERIOR,
+    OPEN,
+    boundary_treatment,
+    ghost_layer,
+    ghosts,
+    with_ghosts,
+)
 from quadcurv.rates import fitted_rate
 
 every_laplacian = pytest.mark.parametrize(
@@ -114,6 +122,28 @@ def test_a_grid_as_a_shuffled_face_list_has_the_ghosts_of_the_grid(name, scheme,
     assert np.abs(mean_curvature(mesh, scheme) - H).max() < 1e-12 * max(np.abs(H).max(), 1)
     assert np.array_equal(boundary_treatment(mesh), boundary_treatment(grid).ravel()[order])
     assert len(stencils(mesh).points) == len(stencils(grid).points)
+
+
+@pytest.mark.parametrize(("degree", "layers"), [(5, 2), (4, 2), (3, 3)])
+@pytest.mark.parametrize("name", ["5 x 5", "12 x 7", "catenoid"])
+def test_more_layers_of_a_face_list_are_those_of_the_grid(name, degree, layers, rng):
+    surface, cells = GRIDS[name]
+    surface = surface()
+    grid, *_ = surface.sample(cells)
+    mesh = grid.to_mesh()
+    points, faces, _ = shuffled(mesh.points, mesh.faces, rng)
+    given = QuadMesh(points, faces).stencils()
+    ghosted, rough = with_ghosts(given, ghosts(given, degree, layers))
+    index, expected = ghost_layer(grid.points, grid.wrap, degree, layers)
+    found = ghosted.points[given.n :]
+    assert len(found) == len(expected) == len(rough) - given.n
+    apart = np.linalg.norm(found[:, None] - expected, axis=2)
+    assert max(apart.min(axis=0).max(), apart.min(axis=1).max()) < 1e-11
+    # The quads are those of the larger grid: all vertices but its outermost are closed.
+    whole = QuadMesh(ghosted.points, ghosted.faces)
+    assert whole.n_flipped == 0
+    outermost = sum(2 * n for n, wraps in zip(index.shape[::-1], grid.wrap, strict=True) if not wraps)
+    assert np.count_nonzero(~whole.stencils().closed) == outermost - 4 * (not any(grid.wrap))
 
 
 def quartic(i, j):

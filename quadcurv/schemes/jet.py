@@ -8,8 +8,8 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from quadcurv.boundary import BOUNDARIES, ghost_layer
-from quadcurv.mesh import Bools, Floats, Ints, Mesh, QuadGrid, QuadMesh
+from quadcurv.boundary import BOUNDARIES, ghosts, with_ghosts
+from quadcurv.mesh import Bools, Floats, Ints, Mesh, QuadGrid, QuadMesh, StaggeredGrid, Stencils
 from quadcurv.schemes.base import Curvatures, Fit, StandardErrors
 
 # Most that errors in height, of unit mean square, may grow to in the second derivatives, both in units of
@@ -18,8 +18,6 @@ from quadcurv.schemes.base import Curvatures, Fit, StandardErrors
 _CONDITION = {2: 20.0, 3: 60.0, 4: 220.0}
 _GROWTH = 3
 _GHOST_DEGREE, _GHOST_LAYERS = 5, 2
-# Of a spacing. Ghosts amplify: those of jittered or noisy grids are worse than one-sided fits.
-_ROUGH = 2e-3
 # Of one fit, in vertices of the finite-volume scheme.
 _WORK = 30
 
@@ -55,9 +53,10 @@ def jet(degree: int | Literal["auto"] = 4, rings: int | None = None) -> Fit:
         of order `degree` - 1 elsewhere.
         Where the vertices of the rings do not determine the polynomial well, up to three more rings
         are taken, and if that does not help the degree is lowered; ``Curvatures.degree`` and ``.rings``
-        report it. With boundary="extrapolate" the open sides of a smooth grid get as many ghost layers as
-        rings, of quintic extrapolation, if these are no more than two; all other boundaries, and those of
-        grids that the extrapolation does not fit, one-sided fits.
+        report it. With boundary="extrapolate" as many ghost layers as rings, if these are no more than two,
+        are put around grids and face lists, by quintic extrapolation along strips of six points as
+        :func:`quadcurv.stencils` traces them: borders are then as good as the inside. Fits are one-sided
+        where a strip is rough or cannot be traced.
 
     Raises
     ------
@@ -93,18 +92,17 @@ def _curvatures(mesh: Mesh, boundary: str, degree: int, rings: int) -> Curvature
     if boundary not in BOUNDARIES:
         raise ValueError(f"boundary: expected one of {BOUNDARIES}, got {boundary!r}")
     stencils = mesh.stencils()
-    if isinstance(mesh, QuadGrid):
-        wanted, run = _on_grid(mesh, rings if boundary == "extrapolate" else 0)
-    else:
-        wanted, run = _on_faces(mesh)
+    wanted, run = _on_grid(mesh) if isinstance(mesh, QuadGrid) else _on_faces(mesh)
     if boundary == "nan":
         wanted &= stencils.closed
+    elif rings <= _GHOST_LAYERS and not isinstance(mesh, StaggeredGrid):
+        run = _continued(run, stencils, rings)
     out, degrees, grown = _fits(wanted, run, degree, rings)
     return _unpacked(out, degrees, grown, stencils.shape, stencils.orientable)
 
 
 def _chosen_curvatures(mesh: Mesh, boundary: str) -> Curvatures:
-    wanted, run = _on_grid(mesh, 0) if isinstance(mesh, QuadGrid) else _on_faces(mesh)
+    wanted, run = _on_grid(mesh) if isinstance(mesh, QuadGrid) else _on_faces(mesh)
     return _curvatures(mesh, boundary, *_choice(np.flatnonzero(wanted), run))
 
 
@@ -202,59 +200,42 @@ def _unpacked(out: Floats, degree: Ints, rings: Ints, shape: tuple[int, ...], or
     )
 
 
-def _on_grid(grid: QuadGrid, layers: int) -> tuple[Bools, Run]:
+def _on_grid(grid: QuadGrid) -> tuple[Bools, Run]:
     from quadcurv.kernels import jet as kernel
 
-    points, beyond = grid.points, [0, 0]
-    if 0 < layers <= _GHOST_LAYERS and _roughness(grid) < _ROUGH:
-        index, ghosts = ghost_layer(points, grid.wrap, _GHOST_DEGREE, layers)
-        points = np.concatenate((points.reshape(-1, 3), ghosts))[index]
-        beyond = [0 if wraps else layers for wraps in grid.wrap]
-
     def run(vertices: NDArray[np.int64], degree: int, rings: int) -> Floats:
-        padded, at = points, np.stack(np.divmod(vertices, grid.shape[1]), axis=1)
+        padded, at = grid.points, np.stack(np.divmod(vertices, grid.shape[1]), axis=1) + rings
         for axis, wraps in enumerate(grid.wrap):
-            more = max(rings - beyond[axis], 0)
-            at[:, axis] += more + beyond[axis]
-            pad = [(more, more) if x == axis else (0, 0) for x in range(3)]
+            pad = [(rings, rings) if x == axis else (0, 0) for x in range(3)]
             padded = np.pad(padded, pad, "wrap") if wraps else np.pad(padded, pad, constant_values=np.nan)
         return _run(lambda v, out: kernel.grid_fits(padded, v, degree, rings, out), at.astype(np.int32))
 
     return np.ones(grid.shape[0] * grid.shape[1], bool), run
 
 
-def _roughness(grid: QuadGrid) -> float:
-    """How far, in spacings, extrapolation misses the grid's own points at its open sides."""
-    worst, count = 0.0, _GHOST_DEGREE + 2
-    for axis, wraps in enumerate(grid.wrap):
-        if wraps:
-            continue
-        if grid.shape[axis] < count:
-            return np.inf
-        for side in (slice(None, count), slice(-count, None)):
-            line = np.moveaxis(grid.points, axis, 0)[side]
-            miss = np.linalg.norm(np.diff(line, count - 1, axis=0)[0], axis=-1)
-            spacing = np.linalg.norm(np.diff(line, axis=0), axis=-1).mean(axis=0)
-            worst = max(worst, (miss / np.maximum(spacing, np.finfo(float).tiny)).max())
-    return worst
-
-
 def _on_faces(mesh: Mesh) -> tuple[Bools, Run]:
-    from quadcurv.kernels import jet as kernel
     from quadcurv.kernels import topology
 
     stencils = mesh.stencils()
-    normals = stencils.ring_areas
-    indptr, corners = topology.corners_by_vertex(stencils.faces, len(stencils.points))
     wanted = np.ones(stencils.n, bool)
     if isinstance(mesh, QuadMesh):
         wanted = (mesh._kind == topology.INTERIOR) | (mesh._kind == topology.BOUNDARY)
-        # The polygon around a vertex of valence 2 has no area: those of its neighbours will do.
-        flat = np.flatnonzero(wanted & ~normals.any(axis=1))
-        normals = normals.copy() if flat.size else normals
-        for v in flat:
-            around = stencils.faces[corners[indptr[v] : indptr[v + 1]] // 4]
-            normals[v] = stencils.ring_areas[np.unique(around[around >= 0])].sum(axis=0)
+    return wanted, _over_faces(stencils)
+
+
+def _over_faces(stencils: Stencils) -> Run:
+    from quadcurv.kernels import jet as kernel
+    from quadcurv.kernels import topology
+
+    normals = stencils.ring_areas
+    indptr, corners = topology.corners_by_vertex(stencils.faces, len(stencils.points))
+    # The polygon around a vertex of valence 2 has no area: those of its neighbours will do.
+    flat = np.flatnonzero((np.diff(indptr)[: stencils.n] > 0) & ~normals.any(axis=1))
+    normals = normals.copy() if flat.size else normals
+    for v in flat:
+        around = stencils.faces[corners[indptr[v] : indptr[v + 1]] // 4]
+        around = around[(around >= 0) & (around < stencils.n)]
+        normals[v] = stencils.ring_areas[np.unique(around)].sum(axis=0)
 
     def run(vertices: NDArray[np.int64], degree: int, rings: int) -> Floats:
         return _run(
@@ -264,7 +245,52 @@ def _on_faces(mesh: Mesh) -> tuple[Bools, Run]:
             vertices.astype(np.int32),
         )
 
-    return wanted, run
+    return run
+
+
+def _continued(run: Run, stencils: Stencils, layers: int) -> Run:
+    """The same fits, save that those over `layers` rings have ghosts where these are complete and smooth."""
+    from quadcurv.kernels import topology
+
+    border = np.flatnonzero(~stencils.closed)
+    if border.size == 0:
+        return run
+    kept, faces = topology.part_around(stencils.faces, border, stencils.n, _GHOST_DEGREE)
+    closed = stencils.closed[kept]
+    part = Stencils(stencils.points[kept], faces, closed.shape, closed, stencils.orientable)
+    layer = ghosts(part, _GHOST_DEGREE, layers)
+    if layer.quads.size == 0:
+        return run
+    ghosted, rough = with_ghosts(part, layer)
+    near = np.arange(rough.size) >= part.n
+    # Ghosts err by some ten times their roughness, one-sided fits by some ten times the turn's third power.
+    bad = rough > _turn(part) ** 3
+    corners = np.where(ghosted.faces < 0, ghosted.faces[:, :1], ghosted.faces)
+    for _ in range(layers):
+        for mark in (near, bad):
+            mark[corners[mark[corners].any(axis=1)]] = True
+        bad[: part.n] |= ~ghosted.closed  # beside these, ghosts are missing
+    chosen = np.flatnonzero((near & ~bad)[: part.n])
+    place = np.full(stencils.n, -1)
+    place[kept[chosen]] = chosen
+    run_with_ghosts = _over_faces(ghosted)
+
+    def continued(vertices: NDArray[np.int64], degree: int, rings: int) -> Floats:
+        out = run(vertices, degree, rings)
+        if rings == layers:
+            at = place[vertices]
+            out[at >= 0] = run_with_ghosts(at[at >= 0], degree, rings)
+        return out
+
+    return continued
+
+
+def _turn(mesh: Stencils) -> float:
+    """Sine of the angle by which the normal turns across a face, on average."""
+    size = np.linalg.norm(mesh.ring_areas, axis=1, keepdims=True)
+    normals = np.divide(mesh.ring_areas, size, out=np.zeros_like(mesh.ring_areas), where=size > 0)
+    ends = normals[mesh.faces[:, 0]], normals[mesh.faces[:, 2]]
+    return float(np.linalg.norm(np.cross(*ends), axis=1).mean())
 
 
 def _run(fits: Callable[[Any, Floats], None], vertices: Any) -> Floats:
