@@ -26,7 +26,7 @@ from comparisons.common import COLOURS, MARKERS, arguments, figure, paper_style,
 from quadcurv import SCHEMES, Fit, QuadGrid, QuadMesh, Scheme, mean_curvature
 from quadcurv.estimate import disagreement
 from quadcurv.rates import fitted_rate
-from quadcurv.schemes import fundamental_forms, jet
+from quadcurv.schemes import fundamental_forms
 from quadcurv.surfaces import (
     Surface,
     cubed_ellipsoid,
@@ -224,7 +224,7 @@ def ours() -> tuple[Method, ...]:
     def method(scheme: Scheme | Fit) -> Method:
         return Method(scheme.name, OURS, lambda mesh: mean_curvature(mesh, scheme).ravel(), "as they are")
 
-    return tuple(map(method, (*SCHEMES.values(), jet("auto"))))
+    return tuple(map(method, SCHEMES.values()))
 
 
 # The meshes --------------------------------------------------------------------------------------------
@@ -499,7 +499,7 @@ def draw(records: Sequence[dict[str, Any]], output: Path) -> None:
             mine = sorted(
                 (r for r in records if r["mesh"] == mesh and r["method"] == name), key=lambda r: r["n"]
             )
-            own = name in SCHEMES or name == "jet-auto"
+            own = name in SCHEMES
             ax.plot(
                 [r["seconds"] for r in mine],
                 [r["one"] for r in mine],

@@ -41,6 +41,7 @@ SCHEMES: dict[str, Scheme | Fit] = {
         alexa_wardetzky(),
         jet(2),
         jet(),
+        jet("auto"),
     )
 }
 
