@@ -126,7 +126,7 @@ class Stencils:
         """(p, 8) int32: (a, d, a, d, ...) around each regular vertex inside, first -1 for all others."""
         from quadcurv.kernels import topology
 
-        return topology.rings(self.faces, *topology.corners_by_vertex(self.faces, len(self.points)))
+        return topology.rings(self.faces, len(self.points))
 
     @cached_property
     def irregular(self) -> NDArray[np.int64]:
@@ -252,11 +252,7 @@ class QuadMesh:
         """Reject non-manifold edges; turn faces until neighbours agree, or find that they cannot."""
         from quadcurv.kernels import topology
 
-        indptr, corners = topology.corners_by_vertex(self.faces, len(self.points))
-        ring = topology.rings(self.faces, indptr, corners)
-        # Where four quads run the same way round there is nothing to reject or to turn.
-        others = np.flatnonzero(ring[:, 0] < 0)
-        kind, _, bad_edge, n_disagree = topology.order_rings(self.faces, indptr, corners, others)
+        ring, others, kind, bad_edge, n_disagree = topology.fans(self.faces, len(self.points))
         if bad_edge[2]:
             raise MeshError(
                 f"faces: {bad_edge[2]} edge(s) with more than two faces, "
@@ -268,10 +264,7 @@ class QuadMesh:
             quad = self.faces[:, 3] >= 0
             self.faces[turn & quad] = self.faces[turn & quad][:, [0, 3, 2, 1]]
             self.faces[turn & ~quad] = self.faces[turn & ~quad][:, [0, 2, 1, 3]]
-            corners = topology.corners_by_vertex(self.faces, len(self.points))[1]
-            ring = topology.rings(self.faces, indptr, corners)
-            others = np.flatnonzero(ring[:, 0] < 0)
-            kind, *_ = topology.order_rings(self.faces, indptr, corners, others)
+            ring, others, kind, *_ = topology.fans(self.faces, len(self.points))
             if not self.orientable:
                 warnings.warn(
                     "the mesh is non-orientable: its mean curvature has no sign, |H| is given",

@@ -61,23 +61,39 @@ def corners_by_vertex(faces, n):
 
 
 @kernel
-def regular_rings(faces, indptr, corners, ring, start, stop):
+def first_corners(faces, ring, valence):
+    """Put the first four corners of every vertex into its row of `ring`, and count them as far as five."""
+    for f in range(faces.shape[0]):
+        for s in range(4):
+            v = faces[f, s]
+            if v >= 0 and valence[v] < 5:
+                if valence[v] < 4:
+                    ring[v, valence[v]] = 4 * f + s
+                valence[v] += 1
+
+
+@kernel
+def regular_rings(faces, valence, ring, start, stop):
     """Rings (a, d, a, d, ...) of vertices start..stop inside four quads that run the same way round.
 
-    Counter-clockwise from the first corner, eight vertices. A first entry of -1 marks all other vertices.
+    Counter-clockwise from the first corner, eight vertices, where `first_corners` has put corners. A first
+    entry of -1 marks all other vertices.
     """
+    corners = np.empty(4, np.int32)
     for v in range(start, stop):
-        begin = indptr[v]
-        ring[v, 0] = -1
-        if indptr[v + 1] - begin != 4:
+        if valence[v] != 4:
+            ring[v, 0] = -1
             continue
-        f, s = corners[begin] >> 2, corners[begin] & 3
+        for k in range(4):
+            corners[k] = ring[v, k]
+        ring[v, 0] = -1
+        f, s = corners[0] >> 2, corners[0] & 3
         first, exit_ = faces[f, (s + 1) & 3], faces[f, (s + 3) & 3]
         ring[v, 1] = faces[f, (s + 2) & 3]
         ok = faces[f, 3] >= 0
         for turn in range(1, 4):
             found = False
-            for k in range(begin + 1, begin + 4):
+            for k in range(1, 4):
                 f, s = corners[k] >> 2, corners[k] & 3
                 if faces[f, (s + 1) & 3] == exit_:
                     found = faces[f, 3] >= 0
@@ -97,12 +113,38 @@ def regular_rings(faces, indptr, corners, ring, start, stop):
             ring[v, 0] = -1
 
 
-def rings(faces, indptr, corners):
+def rings(faces, n):
     """Ring (n, 8) int32 of every vertex, see `regular_rings`."""
-    n = indptr.size - 1
-    ring = np.empty((n, 8), np.int32)
-    parallel.over(partial(regular_rings, faces, indptr, corners, ring), n, n)
+    ring, valence = np.empty((n, 8), np.int32), np.zeros(n, np.uint8)
+    first_corners(faces, ring, valence)
+    parallel.over(partial(regular_rings, faces, valence, ring), n, n)
     return ring
+
+
+def fans(faces, n):
+    """Rings; the vertices that have none; what `order_rings` says of these.
+
+    Returns
+    -------
+    ring : (n, 8) int32
+        See `regular_rings`. Where four quads run the same way round there is nothing to reject or to turn.
+    others : (k,) int64
+        Vertices without such a ring.
+    kind, bad_edge, n_disagree
+        See `order_rings`.
+    """
+    ring = rings(faces, n)
+    others = np.flatnonzero(ring[:, 0] < 0)
+    kind = np.full(n, INTERIOR, np.uint8)
+    if others.size == 0:
+        return ring, others, kind, np.array([-1, -1, 0]), 0
+    kept, near = part_around(faces, others, n, 1)
+    indptr, corners = corners_by_vertex(near, kept.size)
+    kind_near, _, bad_edge, n_disagree = order_rings(near, indptr, corners, np.arange(others.size))
+    kind[others] = kind_near[: others.size]
+    if bad_edge[2]:
+        bad_edge[:2] = kept[bad_edge[:2]]
+    return ring, others, kind, bad_edge, n_disagree
 
 
 @kernel

@@ -33,7 +33,9 @@ def _flaps(stencils: Stencils) -> tuple[Ints, scipy.sparse.csr_array]:
     beyond_quad = faces[g, 3] >= 0
     sides = np.where(beyond_quad, 4, 3)
     far = np.stack((faces[g, (j + 2) % sides], faces[g, (j + sides - 1) % sides]), axis=1)
-    alone = np.setdiff1d(np.arange(c.size), flap)
+    lacking = np.ones(c.size, bool)
+    lacking[flap] = False
+    alone = np.flatnonzero(lacking)
     rows = np.concatenate((flap, flap, alone, alone, alone))
     columns = np.concatenate((far[:, 0], far[:, 1], a[alone], b[alone], c[alone]))
     ones = np.ones(alone.size)
