@@ -19,6 +19,9 @@ from numba import njit
 LANES = 48
 # Below this part of a term's square nothing is left but rounding.
 PIVOT = 1e-9
+# Steepest that a neighbourhood of more than one ring may be. A polynomial follows no steeper one (a sphere is
+# vertical where its powers stop converging), and what folds over is no graph at all.
+SLOPE = 2.0
 # Columns of a result.
 MEAN, GAUSSIAN, K1, K2 = 0, 1, 2, 3
 DIRECTION1, DIRECTION2, NORMAL = slice(4, 7), slice(7, 10), slice(10, 13)
@@ -27,7 +30,8 @@ SIGMA, ERROR, CONDITION, COLUMNS = 13, 14, 18, 19  # ERROR: four of them
 TURNED = np.array([0, 1, 3, 2, 7, 8, 9, 4, 5, 6, 10, 11, 12, 13, 14, 15, 17, 16, 18])
 SIGNS = np.array([-1.0, 1, -1, -1, 1, 1, 1, 1, 1, 1, -1, -1, -1, 1, 1, 1, 1, 1, 1])
 
-# Nothing but fused multiply-adds is left to the compiler: NaN stays NaN.
+# Nothing but fused multiply-adds is left to the compiler: NaN stays NaN. An unsigned index saves it the look
+# whether to count from the end.
 compiled = partial(njit, cache=True, nogil=True, error_model="numpy", fastmath={"contract"})
 
 
@@ -47,19 +51,22 @@ def terms_of(degree):
 
 
 @compiled()
-def grid_fits(points, vertices, degree, rings, out):
+def grid_fits(points, normals, vertices, degree, rings, out):
     """Fit a grid's vertices over windows of 2 rings + 1 points in both directions.
 
     Parameters
     ----------
     points : (R, C, 3) float64
         The grid with at least `rings` layers around it, NaN where there is no point.
+    normals : (R, C, 3) float64
+        Of any length.
     vertices : (k, 2) int32
         Row and column in `points` of each vertex to fit.
     degree : int
     rings : int
     out : (k, COLUMNS) float64
-        Filled.
+        Filled. With several rings all is NaN, the CONDITION too, where the neighbourhood is too steep; with
+        any, all but the CONDITION, infinite then, where it does not determine the polynomial.
     """
     width = 2 * rings + 1
     P = np.empty((width * width, 4, LANES))
@@ -100,10 +107,13 @@ def grid_fits(points, vertices, degree, rings, out):
                 ax * by - ay * bx,
             )
         fit(P, width * width, frame, degree, terms, work, out[start : start + lanes])
+        for k in range(start, start + lanes):
+            if rings > 1 and steep_window(normals, vertices[k, 0], vertices[k, 1], rings):
+                out[k] = np.nan
 
 
 @compiled()
-def face_fits(points, faces, indptr, corners, normals, vertices, degree, rings, out):
+def face_fits(points, faces, indptr, corners, normals, sided, vertices, degree, rings, out):
     """Fit vertices of a face list over all vertices of `rings` rings of faces around them.
 
     Parameters
@@ -112,8 +122,10 @@ def face_fits(points, faces, indptr, corners, normals, vertices, degree, rings, 
     faces : (m, 4) int32
     indptr, corners
         Corners by vertex, see topology.corners_by_vertex.
-    normals : (p, 3) float64
-        Of any length.
+    normals : (n, 3) float64
+        Of any length; of the first n points.
+    sided : bool
+        Whether they are all on the same side; if not, nobody knows what is too steep.
     vertices : (k,) int32
         Vertices to fit.
     degree, rings, out
@@ -133,13 +145,18 @@ def face_fits(points, faces, indptr, corners, normals, vertices, degree, rings, 
             m = 0
             if lane < lanes:
                 m = neighbourhood(faces, indptr, corners, c, rings, stamp, around)
+                if sided and rings > 1 and steep(normals, around, m):
+                    m = 0
             if m > len(P):
                 larger = np.empty((2 * m, 4, LANES))
                 larger[:count] = P[:count]
                 P = larger
+            cx, cy, cz = points[c, 0], points[c, 1], points[c, 2]
             for k in range(m):
-                for x in range(3):
-                    P[k, x, lane] = points[around[k], x] - points[c, x]
+                v = np.uint32(around[k])
+                P[k, 0, lane] = points[v, 0] - cx
+                P[k, 1, lane] = points[v, 1] - cy
+                P[k, 2, lane] = points[v, 2] - cz
                 P[k, 3, lane] = 1.0
             if m > count:
                 P[count:m, :, :lane] = 0.0
@@ -159,9 +176,9 @@ def neighbourhood(faces, indptr, corners, c, rings, stamp, around):
     for _ in range(rings):
         new = end
         for q in range(begin, end):
-            v = around[q]
+            v = np.uint32(around[q])
             for k in range(indptr[v], indptr[v + 1]):
-                f = corners[k] // 4
+                f = np.uint32(corners[np.uint64(k)]) >> np.uint32(2)
                 for s in range(4):
                     x = faces[f, s]
                     if x >= 0 and stamp[x] != c:
@@ -170,6 +187,36 @@ def neighbourhood(faces, indptr, corners, c, rings, stamp, around):
                         new += 1
         begin, end = end, new
     return end
+
+
+@compiled()
+def steep_window(normals, i, j, rings):
+    """As `steep`, of the window around row i and column j; NaN where there is no vertex."""
+    nx, ny, nz = normals[i, j, 0], normals[i, j, 1], normals[i, j, 2]
+    limit, size = 1.0 + SLOPE * SLOPE, nx * nx + ny * ny + nz * nz
+    found = False
+    for u in range(i - rings, i + rings + 1):
+        for v in range(j - rings, j + rings + 1):
+            x, y, z = normals[u, v, 0], normals[u, v, 1], normals[u, v, 2]
+            up = x * nx + y * ny + z * nz
+            found |= limit * up / size * abs(up) < x * x + y * y + z * z
+    return found
+
+
+@compiled()
+def steep(normals, around, m):
+    """Whether the normal of any vertex of a neighbourhood turns too far from that of the first."""
+    c = around[0]
+    nx, ny, nz = normals[c, 0], normals[c, 1], normals[c, 2]
+    limit, size = 1.0 + SLOPE * SLOPE, nx * nx + ny * ny + nz * nz
+    found = False
+    for k in range(1, m):
+        v = np.uint32(around[k])
+        if v < len(normals):
+            x, y, z = normals[v, 0], normals[v, 1], normals[v, 2]
+            up = x * nx + y * ny + z * nz
+            found |= limit * up / size * abs(up) < x * x + y * y + z * z
+    return found
 
 
 @compiled()

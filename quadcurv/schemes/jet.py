@@ -22,11 +22,7 @@ _GHOST_DEGREE, _GHOST_LAYERS = 5, 2
 _WORK = 30
 
 _REFERENCE = "Cazals and Pouget 2005"
-_CANDIDATES = (
-    *((4, r) for r in range(2, 9)),
-    *((3, r) for r in range(2, 8)),
-    *((2, r) for r in range(2, 7)),
-)
+_CANDIDATES = [(d, r) for d in (4, 3, 2) for r in range(2, 9)]
 _SAMPLE, _LEAST_SAMPLE = 3000, 100
 
 # Vertices (k,), degree, rings -> results (k, COLUMNS).
@@ -52,8 +48,10 @@ def jet(degree: int | Literal["auto"] = 4, rings: int | None = None) -> Fit:
         H of order 4 with degree 4 and of order 2 with the others where neighbourhoods are nearly symmetric,
         of order `degree` - 1 elsewhere.
         Where the vertices of the rings do not determine the polynomial well, up to three more rings
-        are taken, and if that does not help the degree is lowered; ``Curvatures.degree`` and ``.rings``
-        report it. With boundary="extrapolate" as many ghost layers as rings, if these are no more than two,
+        are taken, and if that does not help the degree is lowered. Where several rings are steeper than 2 : 1
+        over the tangent plane, or fold over, fewer are taken. ``Curvatures.degree`` and ``.rings`` report
+        all this; both are 0 where there is no result.
+        With boundary="extrapolate" as many ghost layers as rings, if these are no more than two,
         are put around grids and face lists, by quintic extrapolation along strips of six points as
         :func:`quadcurv.stencils` traces them: borders are then as good as the inside. Fits are one-sided
         where a strip is rough or cannot be traced.
@@ -107,68 +105,78 @@ def _chosen_curvatures(mesh: Mesh, boundary: str) -> Curvatures:
 
 
 def _choice(vertices: NDArray[np.int64], run: Run) -> tuple[int, int]:
-    """Degree and rings of the least risk, the mean square of noise and bias in H, over a sample of vertices.
+    """Degree and rings of the least expected error of H, by noise and bias, over a sample of vertices.
 
-    With H the mean curvature by a fit and H' by one of no lower degree over no more rings, H' - H is
-    uncorrelated with the noise of H, the best linear estimate of all (Gauss and Markov). Hence the mean of
-    (H' - H)^2 is var H' - var H and the square of the bias, less that of H' (Hausman 1978).
+    With H the mean curvature by a fit and H' that by a quartic over no more rings, H' - H is uncorrelated
+    with the noise of H, the best linear estimate of all (Gauss and Markov). Hence the mean of (H' - H)^2 is
+    var H' - var H and the square of how far the biases are apart (Hausman 1978). A quartic over one ring
+    more bears witness too, with var H' + var H at most. Cubics do not against quadratics: their H is of the
+    same order, and its bias often the larger one.
     """
     from quadcurv.kernels import jet as kernel
 
-    if vertices.size < _LEAST_SAMPLE:
+    total = vertices.size
+    if total < _LEAST_SAMPLE:
         return _CANDIDATES[0]
-    if vertices.size > _SAMPLE:
+    if total > _SAMPLE:
         vertices = np.random.default_rng(0).choice(vertices, _SAMPLE, replace=False)
-    fits = {(d, r): run(vertices, d, r) for d, r in _CANDIDATES}
-    with np.errstate(invalid="ignore"):
-        sound = {
-            c: (f[:, kernel.CONDITION] < _CONDITION[c[0]]) & (f[:, kernel.SIGMA] > 0) for c, f in fits.items()
-        }
+    fits, sound = {}, {}
+    for d, r in _CANDIDATES:
+        fits[d, r], degrees, rings = _fits(
+            np.ones(vertices.size, bool), lambda at, d, r: run(vertices[at], d, r), d, r
+        )
+        sound[d, r] = (degrees == d) & (rings == r) & (fits[d, r][:, kernel.SIGMA] > 0)
     # Those that most vertices have room for, at the vertices that have room for all of these.
     fits = {c: f for c, f in fits.items() if sound[c].mean() > 0.5}
     kept = np.all([sound[c] for c in fits], axis=0) if fits else np.zeros(0, bool)
     if kept.sum() < _LEAST_SAMPLE:
         return _CANDIDATES[0]
     H = {c: f[kept, kernel.MEAN] for c, f in fits.items()}
-    error2 = {c: np.mean(f[sound[c], kernel.ERROR]) ** 2 for c, f in fits.items()}  # one-sided ones too
-    sigma2 = {c: np.mean(f[kept, kernel.SIGMA] ** 2) for c, f in fits.items()}
-    noise2 = min(sigma2[c] for c in list(fits)[:2])  # of the highest degree over the fewest rings
-    variance = {
-        c: noise2 * np.mean((f[kept, kernel.ERROR] / f[kept, kernel.SIGMA]) ** 2) for c, f in fits.items()
-    }
+    gain2 = {c: (f[kept, kernel.ERROR] / f[kept, kernel.SIGMA]) ** 2 for c, f in fits.items()}
+    noise2 = np.mean(fits[next(iter(fits))][kept, kernel.SIGMA] ** 2)  # of the fewest rings
+
+    bias: dict[tuple[int, int], float] = {}
+    for c in fits:
+        bias[c] = 0.0
+        for b in [b for b in bias if b != c and b[0] == 4 and b[1] <= c[1] + 1]:
+            # One-sided fits, a tenth as precise, would drown what the others tell.
+            weights = 1 / gain2[b] / np.sum(1 / gain2[b])
+            shared = gain2[c] if b[1] <= c[1] else -gain2[c]
+            apart2 = weights @ ((H[b] - H[c]) ** 2 - noise2 * (gain2[b] - shared))
+            # What chance gives: fits nearer than their windows' width have their noise in common.
+            width = 2 * max(b[1], c[1]) + 1
+            chance = noise2 * (weights @ gain2[b]) * np.sqrt(2 / kept.sum() + width**2 / total)
+            bias[c] = max(bias[c], np.sqrt(max(apart2 - chance, 0.0)) - bias[b])
 
     def risk(c: tuple[int, int]) -> float:
-        bias2 = 0.0
-        for b in fits:
-            if b != c and b[0] >= c[0] and b[1] <= c[1]:
-                # What chance gives: fits nearer than their windows' width have their noise in common.
-                chance = variance[b] * (2 * b[1] + 1) / np.sqrt(kept.sum())
-                bias2 = max(bias2, np.mean((H[b] - H[c]) ** 2) - (variance[b] - variance[c]) - chance)
-        return error2[c] + bias2
+        return float(np.nanmean(np.hypot(fits[c][:, kernel.ERROR], bias[c])))  # one-sided ones too
 
     return min(fits, key=risk)
 
 
 def _fits(wanted: Bools, run: Run, degree: int, rings: int) -> tuple[Floats, Ints, Ints]:
-    """Results, degrees and rings of the first fits that are well conditioned."""
+    """Results, degrees and rings of the first fits that are well conditioned and not too steep."""
     from quadcurv.kernels import jet as kernel
 
     out = np.full((wanted.size, kernel.COLUMNS), np.nan)
     degrees, grown = np.zeros((2, wanted.size), np.int32)
+    most = np.full(wanted.size, rings + _GROWTH)  # rings until it is too steep
     todo = np.flatnonzero(wanted)
     for d in range(degree, 1, -1):
-        for r in range(rings, rings + _GROWTH + 1):
-            if todo.size == 0:
-                break
-            fits = run(todo, d, r)
-            bad = fits[:, kernel.CONDITION] > _CONDITION[d]
-            if todo.size == wanted.size:
+        for r in (*range(rings, rings + _GROWTH + 1), *range(rings - 1, 0, -1)):
+            at = todo[(most[todo] >= r) & ((r >= rings) | (most[todo] < rings))]
+            if at.size == 0:
+                continue
+            fits = run(at, d, r)
+            good = fits[:, kernel.CONDITION] <= _CONDITION[d]
+            most[at[np.isnan(fits[:, kernel.CONDITION])]] = r - 1
+            if at.size == wanted.size:
                 out = fits
-                out[bad] = np.nan
+                out[~good] = np.nan
             else:
-                out[todo[~bad]] = fits[~bad]
-            degrees[todo[~bad]], grown[todo[~bad]] = d, r
-            todo = todo[bad]
+                out[at[good]] = fits[good]
+            degrees[at[good]], grown[at[good]] = d, r
+            todo = todo[degrees[todo] == 0]
     return out, degrees, grown
 
 
@@ -203,14 +211,24 @@ def _unpacked(out: Floats, degree: Ints, rings: Ints, shape: tuple[int, ...], or
 def _on_grid(grid: QuadGrid) -> tuple[Bools, Run]:
     from quadcurv.kernels import jet as kernel
 
+    normals = grid.stencils().ring_areas.reshape(grid.points.shape)
+
     def run(vertices: NDArray[np.int64], degree: int, rings: int) -> Floats:
-        padded, at = grid.points, np.stack(np.divmod(vertices, grid.shape[1]), axis=1) + rings
-        for axis, wraps in enumerate(grid.wrap):
-            pad = [(rings, rings) if x == axis else (0, 0) for x in range(3)]
-            padded = np.pad(padded, pad, "wrap") if wraps else np.pad(padded, pad, constant_values=np.nan)
-        return _run(lambda v, out: kernel.grid_fits(padded, v, degree, rings, out), at.astype(np.int32))
+        at = np.stack(np.divmod(vertices, grid.shape[1]), axis=1) + rings
+        points, normal = (_padded(x, grid.wrap, rings) for x in (grid.points, normals))
+        return _run(
+            lambda v, out: kernel.grid_fits(points, normal, v, degree, rings, out), at.astype(np.int32)
+        )
 
     return np.ones(grid.shape[0] * grid.shape[1], bool), run
+
+
+def _padded(values: Floats, wrap: tuple[bool, bool], layers: int) -> Floats:
+    """With layers around: the other side where it wraps, else NaN."""
+    for axis, wraps in enumerate(wrap):
+        pad = [(layers, layers) if x == axis else (0, 0) for x in range(3)]
+        values = np.pad(values, pad, "wrap") if wraps else np.pad(values, pad, constant_values=np.nan)
+    return values
 
 
 def _on_faces(mesh: Mesh) -> tuple[Bools, Run]:
@@ -240,7 +258,16 @@ def _over_faces(stencils: Stencils) -> Run:
     def run(vertices: NDArray[np.int64], degree: int, rings: int) -> Floats:
         return _run(
             lambda v, out: kernel.face_fits(
-                stencils.points, stencils.faces, indptr, corners, normals, v, degree, rings, out
+                stencils.points,
+                stencils.faces,
+                indptr,
+                corners,
+                normals,
+                stencils.orientable,
+                v,
+                degree,
+                rings,
+                out,
             ),
             vertices.astype(np.int32),
         )
