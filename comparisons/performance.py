@@ -556,10 +556,14 @@ def plots(output: Path, ratios: list[Ratio], times: dict[str, dict[int, dict[str
         axes.plot(share[1], i, "o", color=COLOURS[0], label="measured, quartiles" if i == 0 else None)
         axes.plot(share[3], i, "|", color=COLOURS[1], markersize=10, label="aim" if i == 0 else None)
     axes.axvline(1, color=COLOURS[6], linewidth=0.9, label="must")
-    labels = [f"{r.name} / {r.against}".replace("finite_volume", "FV") for r in goals.values()]
+    labels = [
+        f"{r.name} / {r.against}".replace("finite_volume", "FV").replace("liu", "Liu") for r in goals.values()
+    ]
     axes.set(
         xscale="log", xlabel="times better than it must be", yticks=range(len(goals)), yticklabels=labels
     )
+    axes.minorticks_off()
+    axes.set_xticks((0.5, 1, 2, 4), ("0.5", "1", "2", "4"))
     axes.invert_yaxis()
     axes.legend(fontsize=7)
     save_figure(fig, output, "performance-goals")
