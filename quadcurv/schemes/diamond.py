@@ -13,6 +13,9 @@ import scipy
 
 from quadcurv.mesh import Floats, Frame, Ints, Mesh, QuadGrid, QuadMesh, Stencils
 
+# Of one vertex of a face list and of one row of a matrix, in vertices of a grid.
+_RING_WORK, _ROW_WORK = 4, 8
+
 # Diagonals (u, v) of a quad from its four vertices.
 _B = np.array([[-1.0, 0.0, 1.0, 0.0], [0.0, -1.0, 0.0, 1.0]])
 
@@ -69,7 +72,7 @@ def stiffness(
         out.indices[place], out.data[place] = rows.indices, rows.data
     points, ring = stencils.points.ravel(), stencils.ring
     kernel = partial(diamond.ring_stiffness, points, ring, indptr, out.indices, out.data)
-    parallel.over(kernel, n, n, diamond.BLOCK)
+    parallel.over(kernel, n, _ROW_WORK * n, diamond.BLOCK)
     return out
 
 
@@ -121,12 +124,16 @@ def _write_rings(mesh: QuadMesh, liu: int | None, wanted: list[Floats | None]) -
     n = len(mesh.points)
     order, ring = mesh.ring_order()
     if order is None:
-        parallel.over(partial(diamond.rings, mesh.points.ravel(), ring, liu, *wanted), n, n, diamond.BLOCK)
+        parallel.over(
+            partial(diamond.rings, mesh.points.ravel(), ring, liu, *wanted), n, _RING_WORK * n, diamond.BLOCK
+        )
         return
     points = np.empty_like(mesh.points)
     parallel.over(partial(diamond.gather, mesh.points, order, points), n, n)
     ordered = [None if w is None else np.empty_like(w) for w in wanted]
-    parallel.over(partial(diamond.rings, points.ravel(), ring, liu, *ordered), n, n, diamond.BLOCK)
+    parallel.over(
+        partial(diamond.rings, points.ravel(), ring, liu, *ordered), n, _RING_WORK * n, diamond.BLOCK
+    )
     for w, o in zip(wanted, ordered, strict=True):
         if w is not None and o is not None:
             parallel.over(partial(diamond.scatter, o.reshape(n, -1), order, w.reshape(n, -1)), n, n)
