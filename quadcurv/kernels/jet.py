@@ -190,16 +190,20 @@ def neighbourhood(faces, indptr, corners, c, rings, stamp, around):
 
 
 @compiled()
+def turned(x, y, z, nx, ny, nz):
+    """Whether the first normal, of any length, is further than SLOPE from the second; not if it is NaN."""
+    up, size = x * nx + y * ny + z * nz, nx * nx + ny * ny + nz * nz
+    return (1.0 + SLOPE * SLOPE) * up / size * abs(up) < x * x + y * y + z * z
+
+
+@compiled()
 def steep_window(normals, i, j, rings):
     """As `steep`, of the window around row i and column j; NaN where there is no vertex."""
     nx, ny, nz = normals[i, j, 0], normals[i, j, 1], normals[i, j, 2]
-    limit, size = 1.0 + SLOPE * SLOPE, nx * nx + ny * ny + nz * nz
     found = False
     for u in range(i - rings, i + rings + 1):
         for v in range(j - rings, j + rings + 1):
-            x, y, z = normals[u, v, 0], normals[u, v, 1], normals[u, v, 2]
-            up = x * nx + y * ny + z * nz
-            found |= limit * up / size * abs(up) < x * x + y * y + z * z
+            found |= turned(normals[u, v, 0], normals[u, v, 1], normals[u, v, 2], nx, ny, nz)
     return found
 
 
@@ -208,14 +212,11 @@ def steep(normals, around, m):
     """Whether the normal of any vertex of a neighbourhood turns too far from that of the first."""
     c = around[0]
     nx, ny, nz = normals[c, 0], normals[c, 1], normals[c, 2]
-    limit, size = 1.0 + SLOPE * SLOPE, nx * nx + ny * ny + nz * nz
     found = False
     for k in range(1, m):
         v = np.uint32(around[k])
         if v < len(normals):
-            x, y, z = normals[v, 0], normals[v, 1], normals[v, 2]
-            up = x * nx + y * ny + z * nz
-            found |= limit * up / size * abs(up) < x * x + y * y + z * z
+            found |= turned(normals[v, 0], normals[v, 1], normals[v, 2], nx, ny, nz)
     return found
 
 

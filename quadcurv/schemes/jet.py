@@ -90,7 +90,7 @@ def _curvatures(mesh: Mesh, boundary: str, degree: int, rings: int) -> Curvature
     if boundary not in BOUNDARIES:
         raise ValueError(f"boundary: expected one of {BOUNDARIES}, got {boundary!r}")
     stencils = mesh.stencils()
-    wanted, run = _on_grid(mesh) if isinstance(mesh, QuadGrid) else _on_faces(mesh)
+    wanted, run = _plain(mesh, stencils)
     if boundary == "nan":
         wanted &= stencils.closed
     elif rings <= _GHOST_LAYERS and not isinstance(mesh, StaggeredGrid):
@@ -100,7 +100,7 @@ def _curvatures(mesh: Mesh, boundary: str, degree: int, rings: int) -> Curvature
 
 
 def _chosen_curvatures(mesh: Mesh, boundary: str) -> Curvatures:
-    wanted, run = _on_grid(mesh) if isinstance(mesh, QuadGrid) else _on_faces(mesh)
+    wanted, run = _plain(mesh, mesh.stencils())
     return _curvatures(mesh, boundary, *_choice(np.flatnonzero(wanted), run))
 
 
@@ -208,10 +208,20 @@ def _unpacked(out: Floats, degree: Ints, rings: Ints, shape: tuple[int, ...], or
     )
 
 
-def _on_grid(grid: QuadGrid) -> tuple[Bools, Run]:
+def _plain(mesh: Mesh, stencils: Stencils) -> tuple[Bools, Run]:
+    """The vertices to fit, and their fits without ghosts."""
+    from quadcurv.kernels import topology
+
+    wanted = np.ones(stencils.n, bool)
+    if isinstance(mesh, QuadMesh):
+        wanted = (mesh._kind == topology.INTERIOR) | (mesh._kind == topology.BOUNDARY)
+    return wanted, _on_grid(mesh, stencils) if isinstance(mesh, QuadGrid) else _on_faces(stencils)
+
+
+def _on_grid(grid: QuadGrid, stencils: Stencils) -> Run:
     from quadcurv.kernels import jet as kernel
 
-    normals = grid.stencils().ring_areas.reshape(grid.points.shape)
+    normals = stencils.ring_areas.reshape(grid.points.shape)
 
     def run(vertices: NDArray[np.int64], degree: int, rings: int) -> Floats:
         at = np.stack(np.divmod(vertices, grid.shape[1]), axis=1) + rings
@@ -220,7 +230,7 @@ def _on_grid(grid: QuadGrid) -> tuple[Bools, Run]:
             lambda v, out: kernel.grid_fits(points, normal, v, degree, rings, out), at.astype(np.int32)
         )
 
-    return np.ones(grid.shape[0] * grid.shape[1], bool), run
+    return run
 
 
 def _padded(values: Floats, wrap: tuple[bool, bool], layers: int) -> Floats:
@@ -231,17 +241,7 @@ def _padded(values: Floats, wrap: tuple[bool, bool], layers: int) -> Floats:
     return values
 
 
-def _on_faces(mesh: Mesh) -> tuple[Bools, Run]:
-    from quadcurv.kernels import topology
-
-    stencils = mesh.stencils()
-    wanted = np.ones(stencils.n, bool)
-    if isinstance(mesh, QuadMesh):
-        wanted = (mesh._kind == topology.INTERIOR) | (mesh._kind == topology.BOUNDARY)
-    return wanted, _over_faces(stencils)
-
-
-def _over_faces(stencils: Stencils) -> Run:
+def _on_faces(stencils: Stencils) -> Run:
     from quadcurv.kernels import jet as kernel
     from quadcurv.kernels import topology
 
@@ -300,7 +300,7 @@ def _continued(run: Run, stencils: Stencils, layers: int) -> Run:
     chosen = np.flatnonzero((near & ~bad)[: part.n])
     place = np.full(stencils.n, -1)
     place[kept[chosen]] = chosen
-    run_with_ghosts = _over_faces(ghosted)
+    run_with_ghosts = _on_faces(ghosted)
 
     def continued(vertices: NDArray[np.int64], degree: int, rings: int) -> Floats:
         out = run(vertices, degree, rings)
