@@ -7,6 +7,8 @@ import os
 import shutil
 import subprocess
 import sys
+import threading
+import time
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from pathlib import Path
@@ -284,7 +286,29 @@ def test_without_a_thread_to_be_had_the_caller_computes(monkeypatch):
     done = []
     qc.set_threads(2)
     parallel.over(lambda start, stop: done.append((start, stop)), 10, 10)
-    assert done == [(0, 10)]
+    assert [i for cut in done for i in range(*cut)] == list(range(10))
+
+
+def test_an_error_in_another_thread_is_raised_and_nothing_waits_inside_another_call(monkeypatch):
+    monkeypatch.setattr(parallel, "SERIAL_BELOW", 0)
+    qc.set_threads(2)
+    caller = threading.get_ident()
+
+    def fail(start, stop):
+        if threading.get_ident() != caller:
+            raise ZeroDivisionError("far away")
+        time.sleep(0.05)
+
+    with pytest.raises(ZeroDivisionError, match="far away"):
+        parallel.over(fail, 10, 10)
+
+    done = []
+
+    def inner(start, stop):
+        parallel.over(lambda i, j: done.extend(range(start + i, start + j)), stop - start, stop - start)
+
+    parallel.over(inner, 100, 100)  # by a pool all of whose threads are busy with the outer call
+    assert sorted(done) == list(range(100))
 
 
 CUBE = "numpy.array([(x, y, z) for x in (0, 1) for y in (0, 1) for z in (0, 1)], float)"

@@ -5,6 +5,7 @@ concurrent callers (workqueue). A kernel gives bitwise the same for any cut into
 """
 
 import os
+from collections import deque
 from itertools import pairwise
 
 SERIAL_BELOW = 200_000  # vertices; less work does not pay for waking a thread
@@ -69,14 +70,31 @@ def over(kernel, size, work, least=1):
     # A few ranges a thread, so that one that is held up does not hold up all.
     parts = min(4 * count, size // least)
     cuts = [size * k // parts for k in range(parts + 1)]
+    left = deque(pairwise(cuts))
+
+    def take():
+        while left:
+            try:
+                cut = left.popleft()
+            except IndexError:  # another thread took the last one
+                return
+            kernel(*cut)
+
     from concurrent.futures import ThreadPoolExecutor  # not needed by small meshes
 
-    if _pool is None or _pool._max_workers != count:
-        _pool = ThreadPoolExecutor(count, thread_name_prefix="quadcurv")
+    # The caller's thread works too: nothing waits for one that is slow to wake, or busy for another caller.
+    helpers = []
     try:
-        ranges = [_pool.submit(kernel, *cut) for cut in pairwise(cuts)]
+        if _pool is None or _pool._max_workers != count - 1:
+            _pool = ThreadPoolExecutor(count - 1, thread_name_prefix="quadcurv")
+        for _ in range(min(count, parts) - 1):
+            helpers.append(_pool.submit(take))
     except RuntimeError:  # the interpreter shuts down, or the system has no thread left
-        kernel(0, size)
-        return
-    for done in ranges:
-        done.result()
+        pass
+    try:
+        take()
+    finally:
+        left.clear()
+        for helper in helpers:
+            if not helper.cancel():
+                helper.result()
