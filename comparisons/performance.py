@@ -108,9 +108,9 @@ def operations() -> dict[str, int]:
     Returns
     -------
     dict
-        "flux", "finish": of one quad and of one vertex. "differences": 2 x 3 for the diagonals of the quad
-        and as many for those of the ring. "sums": 3 x 3 of fluxes into vertices; the four fluxes of a quad
-        are two and their opposites. "all": the total.
+        "differences": 2 x 3 for the diagonals of the quad, twice, and as many for those of the ring. "root",
+        "fluxes": of one quad, whose four fluxes are two and their opposites. "sums": 3 x 3 of fluxes into
+        vertices. "area", "scaling": of one vertex. "all": the total.
     """
     count = 0
 
@@ -134,20 +134,27 @@ def operations() -> dict[str, int]:
         count += 1
         return Counted(np.sqrt(x))
 
-    def run(kernel: Any, *given: Any) -> int:
+    python = {name: f.py_func for name, f in vars(diamond).items() if hasattr(f, "py_func")}
+    names = {**vars(diamond), "sqrt": root}
+    names.update({name: FunctionType(f.__code__, names) for name, f in python.items()})
+
+    def run(name: str, *given: Any) -> int:
         nonlocal count
         count = 0
-        code = kernel.py_func
-        FunctionType(code.__code__, {**code.__globals__, "sqrt": root})(*given)
+        names[name](*given)
         return count
 
-    x = [Counted(v) for v in (1.0, 0.2, 0.3, -0.1, 1.1, 0.4)]
+    u, v = (tuple(map(Counted, x)) for x in ((1.0, 0.2, 0.3), (-0.1, 1.1, 0.4)))
+    place = np.empty(4 * diamond.STRIDE, object)
+    place[0] = u[0]
     parts = {
-        "differences": 12,
-        "flux": run(diamond.flux, *x),
+        "differences": 18,
+        "root": run("norm", names["cross"](u, v)) + run("cross", u, v) + run("quotient", 0.5, u[0]),
+        "fluxes": run("half_fluxes", u, v, u[0]),
         "sums": 9,
-        # The flux and two diagonals; Liu's sum of areas is not asked for, and H n alone wanted.
-        "finish": run(diamond.finish, 0, *x[:3], *x, None, 0.0, np.empty(3), None, None, None),
+        # Of H n alone; Liu's sum of areas is not asked for.
+        "area": run("weigh", place, 0, u, v, None, 0.0, place, None, None, None, 0),
+        "scaling": run("finish", *u, place, 0, np.empty(3), None, 0),
     }
     return {**parts, "all": sum(parts.values())}
 

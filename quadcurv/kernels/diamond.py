@@ -6,14 +6,17 @@ same with the other sign. This is Liu's alpha (a - c) + beta (b - c) + gamma (d 
 (a^11 t1 + a^12 t2) / |t^(1)| |t2| / 2 of the finite-volume scheme with t1 = d - c, t2 = b - a.
 |n| rather than the Gram determinant (thesis, eq. 3.27): no cancellation.
 
-The loops over grids and over rings are written for the compiler to vectorise:
+The loops over grids and over rings are written for the compiler to vectorise and the processor to overlap:
 
-* Coordinates are first de-interleaved into x, y and z planes that the loop only reads. What it writes is in
+* Coordinates are first de-interleaved into x, y and z planes that a loop only reads. What it writes is in
   few other arrays, so that there is little to prove about what overlaps.
 * All indices are unsigned and the distances between planes constant. (A signed index may count from the
   end of an array and becomes a gather.)
 * On grids the fluxes of the quad before are carried from one turn of the loop to the next instead of
   stored, which the compiler knows how to shift along its vectors.
+* Roots and divisions have loops of their own, which leave them in the second-level cache. (With them the
+  way from points to result takes 90 cycles, and a processor that looks 250 instructions ahead would see a
+  single turn of the loop, and wait. Computing u x v a second time costs less.)
 
 Every vertex sums its quads in the same order however the work is cut: results are bitwise the same.
 """
@@ -24,7 +27,7 @@ import numpy as np
 
 from quadcurv.kernels.compiled import helper, inlined, kernel
 
-WIDTH = 4096  # columns done at once: their rows stay in the second-level cache
+WIDTH = 1024  # columns done at once: their rows stay in the second-level cache
 BLOCK = 64  # vertices of a face list done at once: their rings stay in the first-level cache
 LEAST_ROWS = 64  # of a range of its own, which computes a row of quads that others compute too
 STRIDE = WIDTH + 16
@@ -35,125 +38,165 @@ SIDE, TWICE, POINT = np.uint64(BLOCK), np.uint64(2 * BLOCK), np.uint64(3 * BLOCK
 
 
 @inlined
-def flux(ux, uy, uz, vx, vy, vz):
-    """Half fluxes into a quad's first and second vertex, and twice its area, from its diagonals."""
-    nx, ny, nz = uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx
-    length = sqrt(nx * nx + ny * ny + nz * nz)
-    scale = 0.5 / length if length > 0 else nan  # where an area underflows, n does not vanish
-    nx, ny, nz = nx * scale, ny * scale, nz * scale
+def apart(x, i, j, plane):
+    """Point i less point j of planes x."""
+    return x[i] - x[j], x[i + plane] - x[j + plane], x[i + TWO * plane] - x[j + TWO * plane]
+
+
+@inlined
+def cross(a, b):
+    """Cross product of two triples."""
     return (
-        vy * nz - vz * ny,
-        vz * nx - vx * nz,
-        vx * ny - vy * nx,
-        ny * uz - nz * uy,
-        nz * ux - nx * uz,
-        nx * uy - ny * ux,
-        length,
+        a[1] * b[2] - a[2] * b[1],
+        a[2] * b[0] - a[0] * b[2],
+        a[0] * b[1] - a[1] * b[0],
     )
 
 
 @inlined
-def quad(ring, p, q):
-    """`flux` of the quad whose first two vertices are at p and q, the others beside them."""
-    return flux(
-        ring[q + ONE] - ring[p],
-        ring[q + ONE + Y] - ring[p + Y],
-        ring[q + ONE + Z] - ring[p + Z],
-        ring[p + ONE] - ring[q],
-        ring[p + ONE + Y] - ring[q + Y],
-        ring[p + ONE + Z] - ring[q + Z],
-    )
+def dot(a, b):
+    """Inner product of two triples."""
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
 @inlined
-def finish(k, tx, ty, tz, ax, ay, az, bx, by, bz, liu, lengths, Hn, H, normal, area):
-    """Write what is wanted at vertex k.
+def norm(a):
+    """Length of a triple."""
+    return sqrt(dot(a, a))
 
-    t is the sum of half fluxes; the dual area is |a x b| / 4, in Liu's formula lengths / 8.
+
+@inlined
+def quotient(x, y):
+    """Quotient by a positive y, else NaN: where an area underflows, u x v does not vanish."""
+    return x / y if y > 0 else nan
+
+
+@inlined
+def half_fluxes(u, v, scale):
+    """Half fluxes into a quad's first and second vertex from its diagonals; scale is 1 / (2 |u x v|)."""
+    n = cross(u, v)
+    n = n[0] * scale, n[1] * scale, n[2] * scale
+    return cross(v, n), cross(n, u)
+
+
+@inlined
+def weigh(weights, i, a, b, liu, lengths, Hn, H, normal, area, k):
+    """Put what a sum of half fluxes is multiplied by at place i; write normal and area of vertex k.
+
+    The dual area is |a x b| / 4, in Liu's formula lengths / 8. The first plane of weights makes Hn, the
+    others H. What is not wanted is None.
     """
-    nx, ny, nz = ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx
-    square = nx * nx + ny * ny + nz * nz
+    n = cross(a, b)
+    square = dot(n, n)
     length = sqrt(square)
-    unit = 1 / length if length > 0 else nan
-    scale = 2 * unit  # 1 / (2 dual area)
-    if liu is not None:
-        scale = 4 / lengths if lengths > 0 else nan
+    unit = quotient(1, length)
+    scale = 2 * unit if liu is None else quotient(4, lengths)  # 1 / (2 dual area)
     if Hn is not None:
-        Hn[THREE * k] = tx * scale
-        Hn[THREE * k + ONE] = ty * scale
-        Hn[THREE * k + TWO] = tz * scale
+        weights[i] = scale
     if H is not None:
-        along = tx * nx + ty * ny + tz * nz
-        if liu is None:
-            H[k] = -2 * along / square if square > 0 else nan  # = -scale * unit * along without the root
-        else:
-            H[k] = -scale * unit * along
+        along = quotient(-2, square) if liu is None else -scale * unit  # the former has no root
+        weights[i + Y] = along * n[0]
+        weights[i + Z] = along * n[1]
+        weights[i + A] = along * n[2]
     if normal is not None:
-        normal[THREE * k] = nx * unit
-        normal[THREE * k + ONE] = ny * unit
-        normal[THREE * k + TWO] = nz * unit
+        normal[THREE * k] = n[0] * unit
+        normal[THREE * k + ONE] = n[1] * unit
+        normal[THREE * k + TWO] = n[2] * unit
     if area is not None:
         area[k] = 0.25 * length if liu is None else 0.125 * lengths
 
 
+@inlined
+def finish(tx, ty, tz, weights, i, Hn, H, k):
+    """Write the curvatures of vertex k from the sum t of its half fluxes and the weights at place i."""
+    if Hn is not None:
+        Hn[THREE * k] = tx * weights[i]
+        Hn[THREE * k + ONE] = ty * weights[i]
+        Hn[THREE * k + TWO] = tz * weights[i]
+    if H is not None:
+        H[k] = tx * weights[i + Y] + ty * weights[i + Z] + tz * weights[i + A]
+
+
+@inlined
+def quad(ring, p, q):
+    """Diagonals of the quad whose first two vertices are at p and q, the others beside them."""
+    return apart(ring, q + ONE, p, Y), apart(ring, p + ONE, q, Y)
+
+
 @helper
-def first_row(ring, p, q, part, width):
-    """Sums of the vertices in row q from the quads between rows p and q."""
+def root_row(ring, p, q, roots, width):
+    """1 / (2 |u x v|) and |u x v| of the quads between two rows, from the one before the first."""
+    p, q = p + FIRST - ONE, q + FIRST - ONE
+    for k in range(np.uint64(0), width + ONE):
+        u, v = quad(ring, p + k, q + k)
+        length = norm(cross(u, v))
+        roots[k] = quotient(0.5, length)
+        roots[k + Y] = length
+
+
+@helper
+def first_row(ring, p, q, roots, part, width):
+    """Begin the sums of the vertices in row q with the quads between rows p and q."""
     p, q = p + FIRST, q + FIRST
-    gx, gy, gz, _, _, _, before = quad(ring, p - ONE, q - ONE)
+    u, v = quad(ring, p - ONE, q - ONE)
+    (gx, gy, gz), _ = half_fluxes(u, v, roots[0])
     for k in range(np.uint64(0), width):
-        hx, hy, hz, fx, fy, fz, length = quad(ring, p + k, q + k)
+        u, v = quad(ring, p + k, q + k)
+        (hx, hy, hz), (fx, fy, fz) = half_fluxes(u, v, roots[k + ONE])
         part[k] = fx - gx
         part[k + Y] = fy - gy
         part[k + Z] = fz - gz
-        part[k + A] = length + before
-        gx, gy, gz, before = hx, hy, hz, length
+        part[k + A] = roots[k + Y + ONE] + roots[k + Y]
+        gx, gy, gz = hx, hy, hz
 
 
 @helper
-def vertex_row(ring, o, p, q, part, row, fresh, liu, Hn, H, normal, area, at, width):
-    """Finish the vertices of row p between rows o and q; begin those of row q.
-
-    A row of quads adds to two rows of vertices. The sums of the upper one are finished, divided and written
-    in the same loop; those of the lower one wait in `part` for the next row of quads. `row`, the one after q,
-    is de-interleaved on the way: it arrives from memory while the quads are computed.
-    """
+def weigh_row(ring, o, p, q, roots, part, weights, liu, Hn, H, normal, area, at, width):
+    """`weigh` the vertices of row p between rows o and q."""
     o, p, q = o + FIRST, p + FIRST, q + FIRST
-    gx, gy, gz, ex, ey, ez, before = quad(ring, p - ONE, q - ONE)
     for k in range(np.uint64(0), width):
-        hx, hy, hz, fx, fy, fz, length = quad(ring, p + k, q + k)
+        weigh(
+            weights,
+            k,
+            apart(ring, q + k, o + k, Y),
+            apart(ring, p + k + ONE, p + k - ONE, Y),
+            liu,
+            part[k + A] + (roots[k + Y + ONE] + roots[k + Y]),
+            Hn,
+            H,
+            normal,
+            area,
+            at + k,
+        )
+
+
+@helper
+def vertex_row(ring, p, q, roots, weights, part, row, fresh, liu, Hn, H, at, width):
+    """Finish the vertices of row p; begin those of row q.
+
+    A row of quads adds to two rows of vertices. The sums of the upper one are finished and written in the
+    same loop; those of the lower one wait in `part` for the next row of quads. `row`, the one after q, is
+    de-interleaved on the way: it arrives from memory while the quads are computed.
+    """
+    p, q = p + FIRST, q + FIRST
+    u, v = quad(ring, p - ONE, q - ONE)
+    (gx, gy, gz), (ex, ey, ez) = half_fluxes(u, v, roots[0])
+    for k in range(np.uint64(0), width):
+        u, v = quad(ring, p + k, q + k)
+        (hx, hy, hz), (fx, fy, fz) = half_fluxes(u, v, roots[k + ONE])
         tx = part[k] + (hx - ex)
         ty = part[k + Y] + (hy - ey)
         tz = part[k + Z] + (hz - ez)
         part[k] = fx - gx
         part[k + Y] = fy - gy
         part[k + Z] = fz - gz
-        lengths = 0.0
         if liu is not None:
-            lengths = part[k + A] + (length + before)
-            part[k + A] = length + before
-        gx, gy, gz, ex, ey, ez, before = hx, hy, hz, fx, fy, fz, length
+            part[k + A] = roots[k + Y + ONE] + roots[k + Y]
+        gx, gy, gz, ex, ey, ez = hx, hy, hz, fx, fy, fz
         fresh[k] = row[THREE * k]
         fresh[k + Y] = row[THREE * k + ONE]
         fresh[k + Z] = row[THREE * k + TWO]
-        finish(
-            at + k,
-            tx,
-            ty,
-            tz,
-            ring[q + k] - ring[o + k],
-            ring[q + k + Y] - ring[o + k + Y],
-            ring[q + k + Z] - ring[o + k + Z],
-            ring[p + k + ONE] - ring[p + k - ONE],
-            ring[p + k + ONE + Y] - ring[p + k - ONE + Y],
-            ring[p + k + ONE + Z] - ring[p + k - ONE + Z],
-            liu,
-            lengths,
-            Hn,
-            H,
-            normal,
-            area,
-        )
+        finish(tx, ty, tz, weights, k, Hn, H, at + k)
 
 
 @helper
@@ -207,6 +250,7 @@ def vertices(points, beyond, beside, liu, Hn, H, normal, area, start, stop):
     """
     c = points.shape[1] // 3
     ring, fresh, part = np.empty(9 * STRIDE), np.empty(3 * STRIDE), np.empty(4 * STRIDE)
+    roots, weights = np.empty(2 * STRIDE), np.empty(4 * STRIDE)
     size = np.uint64(3 * STRIDE)
     for begin in range(0, c, WIDTH):
         end = min(begin + WIDTH, c)
@@ -216,25 +260,15 @@ def vertices(points, beyond, beside, liu, Hn, H, normal, area, start, stop):
             row = line(points, beyond, i)
             load(ring, at, row[3 * begin : 3 * end], width)
             load_ends(ring, at, row, beside[i + 1], begin, end)
-        first_row(ring, o, p, part, width)
+        root_row(ring, o, p, roots, width)
+        first_row(ring, o, p, roots, part, width)
         for i in range(start, stop):
-            ahead = min(i + 2, stop)
+            ahead, at = min(i + 2, stop), np.uint64(i * c + begin)
             row = line(points, beyond, ahead)
+            root_row(ring, p, q, roots, width)
+            weigh_row(ring, o, p, q, roots, part, weights, liu, Hn, H, normal, area, at, width)
             vertex_row(
-                ring,
-                o,
-                p,
-                q,
-                part,
-                row[3 * begin : 3 * end],
-                fresh,
-                liu,
-                Hn,
-                H,
-                normal,
-                area,
-                np.uint64(i * c + begin),
-                width,
+                ring, p, q, roots, weights, part, row[3 * begin : 3 * end], fresh, liu, Hn, H, at, width
             )
             for x in range(3):
                 plane = np.uint64(x * STRIDE)
@@ -245,61 +279,67 @@ def vertices(points, beyond, beside, liu, Hn, H, normal, area, start, stop):
 
 
 @inlined
-def across(ring, c, d, corners, a, b):
-    """Half flux from the primal point at d into that at c, across the dual edge from a to b."""
-    gx, gy, gz, _, _, _, length = flux(
-        ring[d] - ring[c],
-        ring[d + Y] - ring[c + Y],
-        ring[d + Z] - ring[c + Z],
-        corners[b] - corners[a],
-        corners[b + Y] - corners[a + Y],
-        corners[b + Z] - corners[a + Z],
-    )
-    return gx, gy, gz, length
+def between(ring, c, d, corners, a, b):
+    """Diagonals of the quad of primal points at c and d and dual ones at a and b."""
+    return apart(ring, d, c, Y), apart(corners, b, a, Y)
 
 
 @helper
-def first_cells(ring, p, q, corners, b, part, width):
+def cell_roots(ring, c, d, corners, a, b, roots, width):
+    """1 / (2 |u x v|) and |u x v| of the quads between primal points c and d and dual points a and b, ..."""
+    for k in range(np.uint64(0), width):
+        u, v = between(ring, c + k, d + k, corners, a + k, b + k)
+        length = norm(cross(u, v))
+        roots[k] = quotient(0.5, length)
+        roots[k + Y] = length
+
+
+@helper
+def first_cells(ring, p, q, corners, b, below, part, width):
     """Fluxes from row q of primal points into row p, across row b of dual points."""
-    p, q, b = p + FIRST, q + FIRST, b + FIRST
     for k in range(np.uint64(0), width):
-        part[k], part[k + Y], part[k + Z], part[k + A] = across(
-            ring, p + k, q + k, corners, b + k, b + k + ONE
-        )
+        u, v = between(ring, p + k, q + k, corners, b + k, b + k + ONE)
+        (part[k], part[k + Y], part[k + Z]), _ = half_fluxes(u, v, below[k])
+        part[k + A] = below[k + Y]
 
 
 @helper
-def cell_row(ring, p, q, corners, a, b, part, liu, Hn, H, normal, area, at, width):
-    """Finish the primal points of row p, between rows a and b of dual points; q is the next one."""
-    p, q, a, b = p + FIRST, q + FIRST, a + FIRST, b + FIRST
-    ex, ey, ez, before = across(ring, p - ONE, p, corners, b, a)
+def weigh_cells(corners, a, b, below, beside, part, weights, liu, Hn, H, normal, area, at, width):
+    """`weigh` the primal points between rows a and b of dual points."""
     for k in range(np.uint64(0), width):
-        gx, gy, gz, length = across(ring, p + k, q + k, corners, b + k, b + k + ONE)
-        fx, fy, fz, beside = across(ring, p + k, p + k + ONE, corners, b + k + ONE, a + k + ONE)
-        tx = (gx - part[k]) + (fx - ex)
-        ty = (gy - part[k + Y]) + (fy - ey)
-        tz = (gz - part[k + Z]) + (fz - ez)
-        lengths = (length + part[k + A]) + (beside + before)
-        part[k], part[k + Y], part[k + Z], part[k + A] = gx, gy, gz, length
-        ex, ey, ez, before = fx, fy, fz, beside
-        finish(
-            at + k,
-            tx,
-            ty,
-            tz,
-            corners[b + k + ONE] - corners[a + k],
-            corners[b + k + ONE + Y] - corners[a + k + Y],
-            corners[b + k + ONE + Z] - corners[a + k + Z],
-            corners[a + k + ONE] - corners[b + k],
-            corners[a + k + ONE + Y] - corners[b + k + Y],
-            corners[a + k + ONE + Z] - corners[b + k + Z],
+        weigh(
+            weights,
+            k,
+            apart(corners, b + k + ONE, a + k, Y),
+            apart(corners, a + k + ONE, b + k, Y),
             liu,
-            lengths,
+            (below[k + Y] + part[k + A]) + (beside[k + Y + ONE] + beside[k + Y]),
             Hn,
             H,
             normal,
             area,
+            at + k,
         )
+
+
+@helper
+def cell_row(ring, p, q, corners, a, b, below, beside, weights, part, liu, Hn, H, at, width):
+    """Finish the primal points of row p, between rows a and b of dual points; q is the next one."""
+    u, v = between(ring, p - ONE, p, corners, b, a)
+    (ex, ey, ez), _ = half_fluxes(u, v, beside[0])
+    for k in range(np.uint64(0), width):
+        u, v = between(ring, p + k, q + k, corners, b + k, b + k + ONE)
+        (gx, gy, gz), _ = half_fluxes(u, v, below[k])
+        u, v = between(ring, p + k, p + k + ONE, corners, b + k + ONE, a + k + ONE)
+        (fx, fy, fz), _ = half_fluxes(u, v, beside[k + ONE])
+        tx = (gx - part[k]) + (fx - ex)
+        ty = (gy - part[k + Y]) + (fy - ey)
+        tz = (gz - part[k + Z]) + (fz - ez)
+        part[k], part[k + Y], part[k + Z] = gx, gy, gz
+        if liu is not None:
+            part[k + A] = below[k + Y]
+        ex, ey, ez = fx, fy, fz
+        finish(tx, ty, tz, weights, k, Hn, H, at + k)
 
 
 @kernel
@@ -320,71 +360,75 @@ def cells(points, beyond, beside, halo, dual, liu, Hn, H, normal, area, start, s
     """
     c = dual.shape[1] // 3 - 1
     ring, corners, part = np.empty(6 * STRIDE), np.empty(6 * STRIDE), np.empty(4 * STRIDE)
+    below, right, weights = np.empty(2 * STRIDE), np.empty(2 * STRIDE), np.empty(4 * STRIDE)
     for begin in range(0, c, WIDTH):
         end = min(begin + WIDTH, c)
         width = np.uint64(end - begin)
-        p, q = np.uint64(0), np.uint64(3 * STRIDE)
+        o, r = np.uint64(0), np.uint64(3 * STRIDE)
         for i in range(start - 1, stop + 1):
             row = line(points, beyond, i + halo)
-            load(ring, q, row[3 * (begin + halo) : 3 * (end + halo)], width)
-            load_ends(ring, q, row, beside[i + 1], begin + halo, end + halo)
+            load(ring, r, row[3 * (begin + halo) : 3 * (end + halo)], width)
+            load_ends(ring, r, row, beside[i + 1], begin + halo, end + halo)
+            p, q = o + FIRST, r + FIRST
             if i >= start:
-                load(corners, q, dual[i, 3 * begin : 3 * end + 3], width + ONE)
+                load(corners, r, dual[i, 3 * begin : 3 * end + 3], width + ONE)
+                cell_roots(ring, p, q, corners, q, q + ONE, below, width)
             if i == start:
-                first_cells(ring, p, q, corners, q, part, width)
+                first_cells(ring, p, q, corners, q, below, part, width)
             elif i > start:
                 at = np.uint64((i - 1) * c + begin)
-                cell_row(ring, p, q, corners, p, q, part, liu, Hn, H, normal, area, at, width)
-            p, q = q, p
-
-
-@inlined
-def corner(x, k, a, d, b):
-    """Flux v x n of vertex k of a block in its corner (a, d, b), not divided by 2 |n| yet, and |n|."""
-    ux, uy, uz = x[d + k] - x[k], x[d + k + SIDE] - x[k + SIDE], x[d + k + TWICE] - x[k + TWICE]
-    vx, vy, vz = x[b + k] - x[a + k], x[b + k + SIDE] - x[a + k + SIDE], x[b + k + TWICE] - x[a + k + TWICE]
-    nx, ny, nz = uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx
-    length = sqrt(nx * nx + ny * ny + nz * nz)
-    return vy * nz - vz * ny, vz * nx - vx * nz, vx * ny - vy * nx, length
+                cell_roots(ring, p - ONE, p, corners, q, p, right, width + ONE)
+                weigh_cells(corners, p, q, below, right, part, weights, liu, Hn, H, normal, area, at, width)
+                cell_row(ring, p, q, corners, p, q, below, right, weights, part, liu, Hn, H, at, width)
+            o, r = r, o
 
 
 @inlined
 def two_corners(x, k, a, d, b, e, c):
     """Half fluxes into vertex k from its corners (a, d, b) and (b, e, c), and |n| of both: one division."""
-    px, py, pz, p = corner(x, k, a, d, b)
-    qx, qy, qz, q = corner(x, k, b, e, c)
-    product = p * q
-    scale = 0.5 / product if product > 0 else nan
+    u, v, w, z = (
+        apart(x, d + k, k, SIDE),
+        apart(x, b + k, a + k, SIDE),
+        apart(x, e + k, k, SIDE),
+        apart(x, c + k, b + k, SIDE),
+    )
+    m, n = cross(u, v), cross(w, z)
+    p, q = norm(m), norm(n)
+    f, g = cross(v, m), cross(z, n)
+    scale = quotient(0.5, p * q)
     s, t = q * scale, p * scale
-    return s * px + t * qx, s * py + t * qy, s * pz + t * qz, p + q
+    return s * f[0] + t * g[0], s * f[1] + t * g[1], s * f[2] + t * g[2], p + q
 
 
 @helper
-def block(x, size, at, liu, Hn, H, normal, area):
+def block(x, size, sums, weights, at, liu, Hn, H, normal, area):
     """Finish the vertices of a block from the planes x of their nine points."""
     a0, d0, a1, d1 = np.uint64(1) * POINT, np.uint64(2) * POINT, np.uint64(3) * POINT, np.uint64(4) * POINT
     a2, d2, a3, d3 = np.uint64(5) * POINT, np.uint64(6) * POINT, np.uint64(7) * POINT, np.uint64(8) * POINT
     for k in range(np.uint64(0), size):
-        px, py, pz, p = two_corners(x, k, a0, d0, a1, d1, a2)
-        qx, qy, qz, q = two_corners(x, k, a2, d2, a3, d3, a0)
-        finish(
-            at + k,
-            px + qx,
-            py + qy,
-            pz + qz,
-            x[a2 + k] - x[a0 + k],
-            x[a2 + k + SIDE] - x[a0 + k + SIDE],
-            x[a2 + k + TWICE] - x[a0 + k + TWICE],
-            x[a3 + k] - x[a1 + k],
-            x[a3 + k + SIDE] - x[a1 + k + SIDE],
-            x[a3 + k + TWICE] - x[a1 + k + TWICE],
+        sums[k], sums[k + Y], sums[k + Z], sums[k + A] = two_corners(x, k, a0, d0, a1, d1, a2)
+    for k in range(np.uint64(0), size):
+        tx, ty, tz, lengths = two_corners(x, k, a2, d2, a3, d3, a0)
+        sums[k] += tx
+        sums[k + Y] += ty
+        sums[k + Z] += tz
+        sums[k + A] += lengths
+    for k in range(np.uint64(0), size):
+        weigh(
+            weights,
+            k,
+            apart(x, a2 + k, a0 + k, SIDE),
+            apart(x, a3 + k, a1 + k, SIDE),
             liu,
-            p + q,
+            sums[k + A],
             Hn,
             H,
             normal,
             area,
+            at + k,
         )
+    for k in range(np.uint64(0), size):
+        finish(sums[k], sums[k + Y], sums[k + Z], weights, k, Hn, H, at + k)
 
 
 @inlined
@@ -397,8 +441,24 @@ def gather_ring(points, ring, v, x, k):
         x[at], x[at + SIDE], x[at + TWICE] = points[i], points[i + ONE], points[i + TWO]
 
 
+@helper
+def own(values, width):
+    """Room for the results of a block, where they are wanted."""
+    return None if values is None else np.empty(width * BLOCK)
+
+
+@helper
+def put(block, order, begin, end, width, values):
+    """Write the results of vertices order[begin:end], where they are wanted, to their places."""
+    if values is not None:
+        for k in range(end - begin):
+            i, at = np.uint64(width * order[begin + k]), np.uint64(width * k)
+            for x in range(np.uint64(0), np.uint64(width)):
+                values[i + x] = block[at + x]
+
+
 @kernel
-def rings(points, ring, liu, Hn, H, normal, area, start, stop):
+def rings(points, ring, order, liu, Hn, H, normal, area, start, stop):
     """As `vertices`, of the regular vertices start..stop of a face list.
 
     Parameters
@@ -407,24 +467,34 @@ def rings(points, ring, liu, Hn, H, normal, area, start, stop):
     ring : (n, 8) int32
         The ring (a, d, a, d, ...) of each vertex, counter-clockwise; negative first where the vertex is not
         regular, whose results are NaN.
+    order : (n,) int32 or None
+        Place in the results of each vertex; None: its own.
     liu, Hn, H, normal, area, start, stop
         As for `vertices`.
     """
-    x = np.empty(9 * 3 * BLOCK)
+    x, sums, weights = np.empty(9 * 3 * BLOCK), np.empty(4 * STRIDE), np.empty(4 * STRIDE)
+    if order is not None:
+        b_Hn, b_H, b_normal, b_area = own(Hn, 3), own(H, 1), own(normal, 3), own(area, 1)
     for begin in range(start, stop, BLOCK):
         end = min(begin + BLOCK, stop)
+        size = np.uint64(end - begin)
         for k in range(end - begin):
             gather_ring(points, ring, begin + k, x, np.uint64(k))
-        block(x, np.uint64(end - begin), np.uint64(begin), liu, Hn, H, normal, area)
+        if order is None:
+            block(x, size, sums, weights, np.uint64(begin), liu, Hn, H, normal, area)
+        else:
+            block(x, size, sums, weights, np.uint64(0), liu, b_Hn, b_H, b_normal, b_area)
+            put(b_Hn, order, begin, end, 3, Hn)
+            put(b_H, order, begin, end, 1, H)
+            put(b_normal, order, begin, end, 3, normal)
+            put(b_area, order, begin, end, 1, area)
 
 
 @inlined
-def conductance(ux, uy, uz, vx, vy, vz):
+def conductance(u, v):
     """K_00 and K_01 of a quad: K (u, v) are the half fluxes into its first two vertices."""
-    nx, ny, nz = uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx
-    length = sqrt(nx * nx + ny * ny + nz * nz)
-    scale = 0.5 / length if length > 0 else nan
-    return scale * (vx * vx + vy * vy + vz * vz), -scale * (ux * vx + uy * vy + uz * vz)
+    scale = quotient(0.5, norm(cross(u, v)))
+    return scale * dot(v, v), -scale * dot(u, v)
 
 
 @helper
@@ -439,14 +509,7 @@ def weights(x, size, row):
             np.uint64((2 * j + 2) % 8 + 1) * SIDE,
         )
         for k in range(np.uint64(0), size):
-            own, cross_ = conductance(
-                x[d + k] - x[k],
-                x[d + k + SIDE] - x[k + SIDE],
-                x[d + k + TWICE] - x[k + TWICE],
-                x[b + k] - x[a + k],
-                x[b + k + SIDE] - x[a + k + SIDE],
-                x[b + k + TWICE] - x[a + k + TWICE],
-            )
+            own, cross_ = conductance(apart(x, d + k, k, SIDE), apart(x, b + k, a + k, SIDE))
             row[k] += own
             row[to_d + k] -= own
             row[to_a + k] += cross_
@@ -502,29 +565,11 @@ def ring_stiffness(points, ring, indptr, indices, data, start, stop):
 
 
 @kernel
-def gather(values, order, ordered, start, stop):
-    """ordered[k] = values[order[k]] for start <= k < stop."""
+def gather(points, order, ordered, start, stop):
+    """Points (3 n,) in another order: the k-th is points order[k], for start <= k < stop."""
     for k in range(start, stop):
-        for x in range(values.shape[1]):
-            ordered[k, x] = values[order[k], x]
-
-
-@kernel
-def scatter(ordered, order, values, start, stop):
-    """values[order[k]] = ordered[k] for start <= k < stop."""
-    for k in range(start, stop):
-        for x in range(values.shape[1]):
-            values[order[k], x] = ordered[k, x]
-
-
-@inlined
-def cross(a, b):
-    """Cross product of two triples."""
-    return (
-        a[1] * b[2] - a[2] * b[1],
-        a[2] * b[0] - a[0] * b[2],
-        a[0] * b[1] - a[1] * b[0],
-    )
+        i, at = THREE * np.uint64(order[k]), THREE * np.uint64(k)
+        ordered[at], ordered[at + ONE], ordered[at + TWO] = points[i], points[i + ONE], points[i + TWO]
 
 
 @inlined
@@ -546,7 +591,7 @@ def quads(points, faces, flux, area):
             continue
         u, v = difference(points, j, h), difference(points, k, i)
         n = cross(u, v)
-        length = np.sqrt(n[0] * n[0] + n[1] * n[1] + n[2] * n[2])
+        length = norm(n)
         g, e = cross(v, n), cross(n, u)
         scale = 0.5 / length
         for x in range(3):
@@ -567,7 +612,7 @@ def flaps(points, corners, flux):
         v = difference(points, corners[t, 3], corners[t, 1])
         n = cross(u, v)
         g = cross(v, n)
-        scale = 0.5 / np.sqrt(n[0] * n[0] + n[1] * n[1] + n[2] * n[2])
+        scale = 0.5 / norm(n)
         for x in range(3):
             flux[c, x] += scale * g[x]
 
@@ -582,7 +627,7 @@ def triangles(points, faces, flux, area):
             difference(points, faces[f, 1], faces[f, 0]),
             difference(points, faces[f, 2], faces[f, 0]),
         )
-        length = np.sqrt(n[0] * n[0] + n[1] * n[1] + n[2] * n[2])
+        length = norm(n)
         for s in range(3):
             c, a, b = faces[f, s], faces[f, (s + 1) % 3], faces[f, (s + 2) % 3]
             # Cotan weights at c sum to the opposite edge, turned by 90 degrees into the triangle, halved.
@@ -615,8 +660,8 @@ def conductances(points, quads):
         u = difference(points, quads[f, 2], quads[f, 0])
         v = difference(points, quads[f, 3], quads[f, 1])
         n = cross(u, v)
-        scale = 0.5 / np.sqrt(n[0] * n[0] + n[1] * n[1] + n[2] * n[2])
-        K[f, 0, 0] = scale * (v[0] * v[0] + v[1] * v[1] + v[2] * v[2])
-        K[f, 0, 1] = K[f, 1, 0] = -scale * (u[0] * v[0] + u[1] * v[1] + u[2] * v[2])
-        K[f, 1, 1] = scale * (u[0] * u[0] + u[1] * u[1] + u[2] * u[2])
+        scale = 0.5 / norm(n)
+        K[f, 0, 0] = scale * dot(v, v)
+        K[f, 0, 1] = K[f, 1, 0] = -scale * dot(u, v)
+        K[f, 1, 1] = scale * dot(u, u)
     return K

@@ -11,6 +11,7 @@ from quadcurv.kernels import parallel
 from quadcurv.kernels.compiled import helper, kernel
 
 ISOLATED, INTERIOR, BOUNDARY, SEVERAL_FANS = 0, 1, 2, 3
+PATCH = 65536  # vertices: one step of breadth-first order through them stays in the first-level cache
 
 
 @kernel
@@ -191,28 +192,43 @@ def part_around(faces, vertices, n, reach):
     return kept, place[near]
 
 
+@helper
+def free_neighbour(ring, v, placed):
+    """A neighbour of a regular vertex that has no place yet, -1 if there is none."""
+    if ring[v, 0] >= 0:
+        for k in range(0, 8, 2):
+            if not placed[ring[v, k]]:
+                return ring[v, k]
+    return -1
+
+
 @kernel
 def nearby_order(ring):
-    """Vertices in breadth-first order along the edges of regular vertices: neighbours come close together."""
+    """Vertices patch by patch, each of PATCH neighbours along the edges of regular vertices.
+
+    A patch is a vertex and what comes next in breadth-first order; it begins beside an earlier one.
+    """
     n = ring.shape[0]
     order = np.empty(n, np.int32)
-    queued = np.zeros(n, np.bool_)
-    size = head = 0
+    placed = np.zeros(n, np.bool_)
+    size = beside = 0
     for root in range(n):
-        if queued[root]:
-            continue
-        order[size], queued[root] = root, True
-        size += 1
-        while head < size:
-            v = order[head]
-            head += 1
-            if ring[v, 0] < 0:
-                continue
-            for k in range(0, 8, 2):
-                x = ring[v, k]
-                if not queued[x]:
-                    order[size], queued[x] = x, True
+        start = -1 if placed[root] else root
+        while start >= 0:
+            order[size], placed[start] = start, True
+            head, end = size, min(size + PATCH, n)
+            size += 1
+            while head < size < end:
+                x = free_neighbour(ring, order[head], placed)
+                if x < 0:
+                    head += 1
+                else:
+                    order[size], placed[x] = x, True
                     size += 1
+            start = -1
+            while beside < size and start < 0:
+                start = free_neighbour(ring, order[beside], placed)
+                beside += start < 0
     return order
 
 

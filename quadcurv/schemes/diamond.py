@@ -123,17 +123,9 @@ def _write_rings(mesh: QuadMesh, liu: int | None, wanted: list[Floats | None]) -
 
     n = len(mesh.points)
     order, ring = mesh.ring_order()
-    if order is None:
-        parallel.over(
-            partial(diamond.rings, mesh.points.ravel(), ring, liu, *wanted), n, _RING_WORK * n, diamond.BLOCK
-        )
-        return
-    points = np.empty_like(mesh.points)
-    parallel.over(partial(diamond.gather, mesh.points, order, points), n, n)
-    ordered = [None if w is None else np.empty_like(w) for w in wanted]
-    parallel.over(
-        partial(diamond.rings, points.ravel(), ring, liu, *ordered), n, _RING_WORK * n, diamond.BLOCK
-    )
-    for w, o in zip(wanted, ordered, strict=True):
-        if w is not None and o is not None:
-            parallel.over(partial(diamond.scatter, o.reshape(n, -1), order, w.reshape(n, -1)), n, n)
+    points = mesh.points.ravel()
+    if order is not None:
+        points = np.empty(3 * n)
+        parallel.over(partial(diamond.gather, mesh.points.ravel(), order, points), n, n)
+    kernel = partial(diamond.rings, points, ring, order, liu, *wanted)
+    parallel.over(kernel, n, _RING_WORK * n, diamond.BLOCK)
