@@ -215,8 +215,8 @@ def frame(grid: QuadGrid | StaggeredGrid, boundary: str = "extrapolate") -> Fram
         return near[0] + np.tensordot(_weights(DEGREE), near - near[0], 1)  # an offset costs no digits
 
     beyond = ends(points, grid.wrap[0])
-    c = points.shape[1]
-    ends_of_rows = [k for k in range(c) if min(k, c - 1 - k) <= DEGREE]
+    column = np.arange(points.shape[1])
+    ends_of_rows = column[np.minimum(column, column[::-1]) <= DEGREE]
     sides = np.concatenate([x[:, ends_of_rows] for x in (beyond[:1], points, beyond[1:])])
     beside = ends(sides.swapaxes(0, 1), grid.wrap[1]).swapaxes(0, 1)
     return Frame(beyond.reshape(2, -1), np.ascontiguousarray(beside))

@@ -498,22 +498,21 @@ def conductance(u, v):
 
 
 @helper
-def weights(x, size, row):
+def corner_weights(x, a, d, b, own, mixed, size):
+    """Planes of `conductance` of the corner (a, d, b) of each vertex of a block."""
+    for k in range(np.uint64(0), size):
+        own[k], mixed[k] = conductance(apart(x, d + k, k, SIDE), apart(x, b + k, a + k, SIDE))
+
+
+@helper
+def weigh_points(own, mixed, size, row):
     """Rows of the stiffness of a block, planes of the weights of the nine points in `row`."""
-    for j in range(4):
-        a = np.uint64(2 * j + 1) * POINT
-        d, b = a + POINT, np.uint64((2 * j + 2) % 8 + 1) * POINT
-        to_a, to_d, to_b = (
-            np.uint64(2 * j + 1) * SIDE,
-            np.uint64(2 * j + 2) * SIDE,
-            np.uint64((2 * j + 2) % 8 + 1) * SIDE,
-        )
-        for k in range(np.uint64(0), size):
-            own, cross_ = conductance(apart(x, d + k, k, SIDE), apart(x, b + k, a + k, SIDE))
-            row[k] += own
-            row[to_d + k] -= own
-            row[to_a + k] += cross_
-            row[to_b + k] -= cross_
+    for k in range(np.uint64(0), size):
+        row[k] = (own[k] + own[k + SIDE]) + (own[k + TWICE] + own[k + POINT])
+        for j in range(4):
+            at, before = np.uint64(j) * SIDE + k, np.uint64((j + 3) % 4) * SIDE + k
+            row[np.uint64(2 * j + 1) * SIDE + k] = mixed[at] - mixed[before]
+            row[np.uint64(2 * j + 2) * SIDE + k] = -own[at]
 
 
 @helper
@@ -543,6 +542,7 @@ def ring_stiffness(points, ring, indptr, indices, data, start, stop):
     start, stop : int
     """
     x, row = np.empty(9 * 3 * BLOCK), np.empty(9 * BLOCK)
+    own, mixed = np.empty(4 * BLOCK), np.empty(4 * BLOCK)
     column, rank = np.empty(9 * BLOCK, np.int32), np.empty(9 * BLOCK, np.int32)
     for begin in range(start, stop, BLOCK):
         end = min(begin + BLOCK, stop)
@@ -552,16 +552,20 @@ def ring_stiffness(points, ring, indptr, indices, data, start, stop):
             column[k] = begin + k
             for j in range(8):
                 column[BLOCK * (j + 1) + k] = ring[begin + k, j]
-        row[:] = 0
-        weights(x, size, row)
+        for j in range(4):
+            a, b = np.uint64(2 * j + 1) * POINT, np.uint64((2 * j + 2) % 8 + 1) * POINT
+            corner_weights(x, a, a + POINT, b, own[BLOCK * j :], mixed[BLOCK * j :], size)
+        weigh_points(own, mixed, size, row)
         ranks(column, size, rank)
-        for v in range(begin, end):
+        for k in range(np.uint64(0), size):
+            v = begin + np.int64(k)
             if ring[v, 0] < 0:
                 continue
+            first = np.uint64(indptr[v])
             for j in range(9):
-                at = BLOCK * j + v - begin
-                indices[indptr[v] + rank[at]] = column[at]
-                data[indptr[v] + rank[at]] = row[at]
+                at = np.uint64(j) * SIDE + k
+                i = first + np.uint64(rank[at])
+                indices[i], data[i] = column[at], row[at]
 
 
 @kernel

@@ -68,7 +68,7 @@ def over(kernel, size, work, least=1):
         kernel(0, size)
         return
     # A few ranges a thread, so that one that is held up does not hold up all.
-    parts = min(4 * count, size // least)
+    parts = min(8 * count, size // least)
     cuts = [size * k // parts for k in range(parts + 1)]
     left = deque(pairwise(cuts))
 
