@@ -216,7 +216,7 @@ def frame(grid: QuadGrid | StaggeredGrid, boundary: str = "extrapolate") -> Fram
 
     beyond = ends(points, grid.wrap[0])
     column = np.arange(points.shape[1])
-    ends_of_rows = column[np.minimum(column, column[::-1]) <= DEGREE]
+    ends_of_rows = column[np.minimum(column, column[::-1]) <= (0 if grid.wrap[1] else DEGREE)]
     sides = np.concatenate([x[:, ends_of_rows] for x in (beyond[:1], points, beyond[1:])])
     beside = ends(sides.swapaxes(0, 1), grid.wrap[1]).swapaxes(0, 1)
     return Frame(beyond.reshape(2, -1), np.ascontiguousarray(beside))

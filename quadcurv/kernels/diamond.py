@@ -27,7 +27,7 @@ import numpy as np
 
 from quadcurv.kernels.compiled import helper, inlined, kernel
 
-WIDTH = 1024  # columns done at once: their rows stay in the second-level cache
+WIDTH = 2048  # columns done at once: their rows stay in the second-level cache
 BLOCK = 64  # vertices of a face list done at once: their rings stay in the first-level cache
 LEAST_ROWS = 64  # of a range of its own, which computes a row of quads that others compute too
 STRIDE = WIDTH + 16
@@ -38,9 +38,9 @@ SIDE, TWICE, POINT = np.uint64(BLOCK), np.uint64(2 * BLOCK), np.uint64(3 * BLOCK
 
 
 @inlined
-def apart(x, i, j, plane):
-    """Point i less point j of planes x."""
-    return x[i] - x[j], x[i + plane] - x[j + plane], x[i + TWO * plane] - x[j + TWO * plane]
+def apart(x, i, y, j, plane):
+    """Point i of planes x less point j of planes y."""
+    return x[i] - y[j], x[i + plane] - y[j + plane], x[i + TWO * plane] - y[j + TWO * plane]
 
 
 @inlined
@@ -118,85 +118,89 @@ def finish(tx, ty, tz, weights, i, Hn, H, k):
 
 
 @inlined
-def quad(ring, p, q):
-    """Diagonals of the quad whose first two vertices are at p and q, the others beside them."""
-    return apart(ring, q + ONE, p, Y), apart(ring, p + ONE, q, Y)
+def quad(p, q, i):
+    """Diagonals of the quad whose first two vertices are at i in rows p and q, the others beside them."""
+    return apart(q, i + ONE, p, i, Y), apart(p, i + ONE, q, i, Y)
+
+
+@inlined
+def root(roots, i, u, v):
+    """Put 1 / (2 |u x v|) and |u x v| at place i."""
+    length = norm(cross(u, v))
+    roots[i] = quotient(0.5, length)
+    roots[i + Y] = length
+
+
+@inlined
+def load(planes, i, row, k):
+    """Put point k of a row at place i of the planes."""
+    planes[i] = row[THREE * k]
+    planes[i + Y] = row[THREE * k + ONE]
+    planes[i + Z] = row[THREE * k + TWO]
 
 
 @helper
-def root_row(ring, p, q, roots, width):
-    """1 / (2 |u x v|) and |u x v| of the quads between two rows, from the one before the first."""
-    p, q = p + FIRST - ONE, q + FIRST - ONE
-    for k in range(np.uint64(0), width + ONE):
-        u, v = quad(ring, p + k, q + k)
-        length = norm(cross(u, v))
-        roots[k] = quotient(0.5, length)
-        roots[k + Y] = length
+def root_row(p, q, roots, row, fresh, width):
+    """`root` of the quads between two rows, from the one before the first.
 
-
-@helper
-def first_row(ring, p, q, roots, part, width):
-    """Begin the sums of the vertices in row q with the quads between rows p and q."""
-    p, q = p + FIRST, q + FIRST
-    u, v = quad(ring, p - ONE, q - ONE)
-    (gx, gy, gz), _ = half_fluxes(u, v, roots[0])
+    `row`, the one after q, becomes planes on the way: it arrives from memory while the roots are computed.
+    """
+    u, v = quad(p, q, FIRST - ONE)
+    root(roots, FIRST - ONE, u, v)
     for k in range(np.uint64(0), width):
-        u, v = quad(ring, p + k, q + k)
-        (hx, hy, hz), (fx, fy, fz) = half_fluxes(u, v, roots[k + ONE])
-        part[k] = fx - gx
-        part[k + Y] = fy - gy
-        part[k + Z] = fz - gz
-        part[k + A] = roots[k + Y + ONE] + roots[k + Y]
+        u, v = quad(p, q, FIRST + k)
+        root(roots, FIRST + k, u, v)
+        load(fresh, FIRST + k, row, k)
+
+
+@helper
+def first_row(p, q, roots, part, width):
+    """Begin the sums of the vertices in row q with the quads between rows p and q."""
+    u, v = quad(p, q, FIRST - ONE)
+    (gx, gy, gz), _ = half_fluxes(u, v, roots[FIRST - ONE])
+    for i in range(FIRST, FIRST + width):
+        u, v = quad(p, q, i)
+        (hx, hy, hz), (fx, fy, fz) = half_fluxes(u, v, roots[i])
+        part[i] = fx - gx
+        part[i + Y] = fy - gy
+        part[i + Z] = fz - gz
+        part[i + A] = roots[i + Y] + roots[i + Y - ONE]
         gx, gy, gz = hx, hy, hz
 
 
 @helper
-def weigh_row(ring, o, p, q, roots, part, weights, liu, Hn, H, normal, area, at, width):
+def weigh_row(o, p, q, roots, part, weights, liu, Hn, H, normal, area, at, width):
     """`weigh` the vertices of row p between rows o and q."""
-    o, p, q = o + FIRST, p + FIRST, q + FIRST
     for k in range(np.uint64(0), width):
-        weigh(
-            weights,
-            k,
-            apart(ring, q + k, o + k, Y),
-            apart(ring, p + k + ONE, p + k - ONE, Y),
-            liu,
-            part[k + A] + (roots[k + Y + ONE] + roots[k + Y]),
-            Hn,
-            H,
-            normal,
-            area,
-            at + k,
-        )
+        i = FIRST + k
+        a, b = apart(q, i, o, i, Y), apart(p, i + ONE, p, i - ONE, Y)
+        lengths = part[i + A] + (roots[i + Y] + roots[i + Y - ONE])
+        weigh(weights, i, a, b, liu, lengths, Hn, H, normal, area, at + k)
 
 
 @helper
-def vertex_row(ring, p, q, roots, weights, part, row, fresh, liu, Hn, H, at, width):
+def vertex_row(p, q, roots, weights, part, liu, Hn, H, at, width):
     """Finish the vertices of row p; begin those of row q.
 
     A row of quads adds to two rows of vertices. The sums of the upper one are finished and written in the
-    same loop; those of the lower one wait in `part` for the next row of quads. `row`, the one after q, is
-    de-interleaved on the way: it arrives from memory while the quads are computed.
+    same loop; those of the lower one wait in `part` for the next row of quads.
     """
-    p, q = p + FIRST, q + FIRST
-    u, v = quad(ring, p - ONE, q - ONE)
-    (gx, gy, gz), (ex, ey, ez) = half_fluxes(u, v, roots[0])
+    u, v = quad(p, q, FIRST - ONE)
+    (gx, gy, gz), (ex, ey, ez) = half_fluxes(u, v, roots[FIRST - ONE])
     for k in range(np.uint64(0), width):
-        u, v = quad(ring, p + k, q + k)
-        (hx, hy, hz), (fx, fy, fz) = half_fluxes(u, v, roots[k + ONE])
-        tx = part[k] + (hx - ex)
-        ty = part[k + Y] + (hy - ey)
-        tz = part[k + Z] + (hz - ez)
-        part[k] = fx - gx
-        part[k + Y] = fy - gy
-        part[k + Z] = fz - gz
+        i = FIRST + k
+        u, v = quad(p, q, i)
+        (hx, hy, hz), (fx, fy, fz) = half_fluxes(u, v, roots[i])
+        tx = part[i] + (hx - ex)
+        ty = part[i + Y] + (hy - ey)
+        tz = part[i + Z] + (hz - ez)
+        part[i] = fx - gx
+        part[i + Y] = fy - gy
+        part[i + Z] = fz - gz
         if liu is not None:
-            part[k + A] = roots[k + Y + ONE] + roots[k + Y]
+            part[i + A] = roots[i + Y] + roots[i + Y - ONE]
         gx, gy, gz, ex, ey, ez = hx, hy, hz, fx, fy, fz
-        fresh[k] = row[THREE * k]
-        fresh[k + Y] = row[THREE * k + ONE]
-        fresh[k + Z] = row[THREE * k + TWO]
-        finish(tx, ty, tz, weights, k, Hn, H, at + k)
+        finish(tx, ty, tz, weights, i, Hn, H, at + k)
 
 
 @helper
@@ -210,23 +214,20 @@ def line(points, beyond, i):
 
 
 @helper
-def load(ring, at, row, width):
-    """De-interleave a row."""
-    at += FIRST
+def load_row(planes, row, width):
+    """Put a row into planes."""
     for k in range(np.uint64(0), width):
-        ring[at + k] = row[THREE * k]
-        ring[at + k + Y] = row[THREE * k + ONE]
-        ring[at + k + Z] = row[THREE * k + TWO]
+        load(planes, FIRST + k, row, k)
 
 
 @helper
-def load_ends(ring, at, row, beside, begin, end):
-    """Put the neighbours of columns begin and end - 1 at the ends of a row in the ring."""
-    left, right = at + FIRST - ONE, at + FIRST + np.uint64(end - begin)
+def load_ends(planes, row, beside, begin, end):
+    """Put the neighbours of columns begin and end - 1 at the ends of a row in planes."""
+    right = FIRST + np.uint64(end - begin)
     for x in range(3):
-        plane = np.uint64(x * STRIDE)
-        ring[left + plane] = row[3 * begin - 3 + x] if begin > 0 else beside[0, x]
-        ring[right + plane] = row[3 * end + x] if 3 * end < row.size else beside[1, x]
+        plane = np.uint64(x) * Y
+        planes[FIRST - ONE + plane] = row[3 * begin - 3 + x] if begin > 0 else beside[0, x]
+        planes[right + plane] = row[3 * end + x] if 3 * end < row.size else beside[1, x]
 
 
 @kernel
@@ -249,97 +250,84 @@ def vertices(points, beyond, beside, liu, Hn, H, normal, area, start, stop):
     start, stop : int
     """
     c = points.shape[1] // 3
-    ring, fresh, part = np.empty(9 * STRIDE), np.empty(3 * STRIDE), np.empty(4 * STRIDE)
-    roots, weights = np.empty(2 * STRIDE), np.empty(4 * STRIDE)
-    size = np.uint64(3 * STRIDE)
+    planes = np.empty((4, 3 * STRIDE))
+    part, roots, weights = np.empty(4 * STRIDE), np.empty(2 * STRIDE), np.empty(4 * STRIDE)
     for begin in range(0, c, WIDTH):
         end = min(begin + WIDTH, c)
         width = np.uint64(end - begin)
-        o, p, q = np.uint64(0), size, TWO * size
-        for i, at in ((start - 1, o), (start, p), (start + 1, q)):
+        o, p, q, fresh = planes[0], planes[1], planes[2], planes[3]
+        for i, row_planes in ((start - 1, p), (start, q)):
             row = line(points, beyond, i)
-            load(ring, at, row[3 * begin : 3 * end], width)
-            load_ends(ring, at, row, beside[i + 1], begin, end)
-        root_row(ring, o, p, roots, width)
-        first_row(ring, o, p, roots, part, width)
-        for i in range(start, stop):
+            load_row(row_planes, row[3 * begin : 3 * end], width)
+            load_ends(row_planes, row, beside[i + 1], begin, end)
+        for i in range(start - 1, stop):  # the row of quads below the vertices of row i
             ahead, at = min(i + 2, stop), np.uint64(i * c + begin)
             row = line(points, beyond, ahead)
-            root_row(ring, p, q, roots, width)
-            weigh_row(ring, o, p, q, roots, part, weights, liu, Hn, H, normal, area, at, width)
-            vertex_row(
-                ring, p, q, roots, weights, part, row[3 * begin : 3 * end], fresh, liu, Hn, H, at, width
-            )
-            for x in range(3):
-                plane = np.uint64(x * STRIDE)
-                for k in range(np.uint64(0), width):
-                    ring[o + FIRST + plane + k] = fresh[plane + k]
-            load_ends(ring, o, row, beside[ahead + 1], begin, end)
-            o, p, q = p, q, o
-
-
-@inlined
-def between(ring, c, d, corners, a, b):
-    """Diagonals of the quad of primal points at c and d and dual ones at a and b."""
-    return apart(ring, d, c, Y), apart(corners, b, a, Y)
+            root_row(p, q, roots, row[3 * begin : 3 * end], fresh, width)
+            load_ends(fresh, row, beside[ahead + 1], begin, end)
+            if i < start:
+                first_row(p, q, roots, part, width)
+            else:
+                weigh_row(o, p, q, roots, part, weights, liu, Hn, H, normal, area, at, width)
+                vertex_row(p, q, roots, weights, part, liu, Hn, H, at, width)
+            o, p, q, fresh = p, q, fresh, o
 
 
 @helper
-def cell_roots(ring, c, d, corners, a, b, roots, width):
-    """1 / (2 |u x v|) and |u x v| of the quads between primal points c and d and dual points a and b, ..."""
-    for k in range(np.uint64(0), width):
-        u, v = between(ring, c + k, d + k, corners, a + k, b + k)
-        length = norm(cross(u, v))
-        roots[k] = quotient(0.5, length)
-        roots[k + Y] = length
+def across_rows(p, q, b, roots, width):
+    """`root` of the edges between primal rows p and q, along dual row b."""
+    for i in range(FIRST, FIRST + width):
+        root(roots, i, apart(q, i, p, i, Y), apart(b, i + ONE, b, i, Y))
 
 
 @helper
-def first_cells(ring, p, q, corners, b, below, part, width):
-    """Fluxes from row q of primal points into row p, across row b of dual points."""
-    for k in range(np.uint64(0), width):
-        u, v = between(ring, p + k, q + k, corners, b + k, b + k + ONE)
-        (part[k], part[k + Y], part[k + Z]), _ = half_fluxes(u, v, below[k])
-        part[k + A] = below[k + Y]
+def along_row(p, a, b, roots, width):
+    """`root` of the edges between the points of primal row p, from dual row b to a."""
+    for i in range(FIRST - ONE, FIRST + width):
+        root(roots, i, apart(p, i + ONE, p, i, Y), apart(a, i + ONE, b, i + ONE, Y))
 
 
 @helper
-def weigh_cells(corners, a, b, below, beside, part, weights, liu, Hn, H, normal, area, at, width):
-    """`weigh` the primal points between rows a and b of dual points."""
-    for k in range(np.uint64(0), width):
-        weigh(
-            weights,
-            k,
-            apart(corners, b + k + ONE, a + k, Y),
-            apart(corners, a + k + ONE, b + k, Y),
-            liu,
-            (below[k + Y] + part[k + A]) + (beside[k + Y + ONE] + beside[k + Y]),
-            Hn,
-            H,
-            normal,
-            area,
-            at + k,
-        )
+def first_cells(p, q, b, below, part, width):
+    """Fluxes from primal row q into row p, across dual row b."""
+    for i in range(FIRST, FIRST + width):
+        (gx, gy, gz), _ = half_fluxes(apart(q, i, p, i, Y), apart(b, i + ONE, b, i, Y), below[i])
+        part[i] = gx
+        part[i + Y] = gy
+        part[i + Z] = gz
+        part[i + A] = below[i + Y]
 
 
 @helper
-def cell_row(ring, p, q, corners, a, b, below, beside, weights, part, liu, Hn, H, at, width):
-    """Finish the primal points of row p, between rows a and b of dual points; q is the next one."""
-    u, v = between(ring, p - ONE, p, corners, b, a)
-    (ex, ey, ez), _ = half_fluxes(u, v, beside[0])
+def weigh_cells(a, b, below, beside, part, weights, liu, Hn, H, normal, area, at, width):
+    """`weigh` the primal points between dual rows a and b."""
     for k in range(np.uint64(0), width):
-        u, v = between(ring, p + k, q + k, corners, b + k, b + k + ONE)
-        (gx, gy, gz), _ = half_fluxes(u, v, below[k])
-        u, v = between(ring, p + k, p + k + ONE, corners, b + k + ONE, a + k + ONE)
-        (fx, fy, fz), _ = half_fluxes(u, v, beside[k + ONE])
-        tx = (gx - part[k]) + (fx - ex)
-        ty = (gy - part[k + Y]) + (fy - ey)
-        tz = (gz - part[k + Z]) + (fz - ez)
-        part[k], part[k + Y], part[k + Z] = gx, gy, gz
+        i = FIRST + k
+        u, v = apart(b, i + ONE, a, i, Y), apart(a, i + ONE, b, i, Y)
+        lengths = (below[i + Y] + part[i + A]) + (beside[i + Y] + beside[i + Y - ONE])
+        weigh(weights, i, u, v, liu, lengths, Hn, H, normal, area, at + k)
+
+
+@helper
+def cell_row(p, q, a, b, below, beside, weights, part, liu, Hn, H, at, width):
+    """Finish the points of primal row p, between dual rows a and b; q is the next one."""
+    u, v = apart(p, FIRST, p, FIRST - ONE, Y), apart(a, FIRST, b, FIRST, Y)
+    (ex, ey, ez), _ = half_fluxes(u, v, beside[FIRST - ONE])
+    for k in range(np.uint64(0), width):
+        i = FIRST + k
+        (gx, gy, gz), _ = half_fluxes(apart(q, i, p, i, Y), apart(b, i + ONE, b, i, Y), below[i])
+        u, v = apart(p, i + ONE, p, i, Y), apart(a, i + ONE, b, i + ONE, Y)
+        (fx, fy, fz), _ = half_fluxes(u, v, beside[i])
+        tx = (gx - part[i]) + (fx - ex)
+        ty = (gy - part[i + Y]) + (fy - ey)
+        tz = (gz - part[i + Z]) + (fz - ez)
+        part[i] = gx
+        part[i + Y] = gy
+        part[i + Z] = gz
         if liu is not None:
-            part[k + A] = below[k + Y]
+            part[i + A] = below[i + Y]
         ex, ey, ez = fx, fy, fz
-        finish(tx, ty, tz, weights, k, Hn, H, at + k)
+        finish(tx, ty, tz, weights, i, Hn, H, at + k)
 
 
 @kernel
@@ -359,38 +347,38 @@ def cells(points, beyond, beside, halo, dual, liu, Hn, H, normal, area, start, s
         As for `vertices`.
     """
     c = dual.shape[1] // 3 - 1
-    ring, corners, part = np.empty(6 * STRIDE), np.empty(6 * STRIDE), np.empty(4 * STRIDE)
-    below, right, weights = np.empty(2 * STRIDE), np.empty(2 * STRIDE), np.empty(4 * STRIDE)
+    primal, corners = np.empty((2, 3 * STRIDE)), np.empty((2, 3 * STRIDE))
+    part, below, right = np.empty(4 * STRIDE), np.empty(2 * STRIDE), np.empty(2 * STRIDE)
+    weights = np.empty(4 * STRIDE)
     for begin in range(0, c, WIDTH):
         end = min(begin + WIDTH, c)
         width = np.uint64(end - begin)
-        o, r = np.uint64(0), np.uint64(3 * STRIDE)
-        for i in range(start - 1, stop + 1):
+        p, q, a, b = primal[0], primal[1], corners[0], corners[1]
+        for i in range(start - 1, stop + 1):  # p and a are rows i - 1 once they are there
             row = line(points, beyond, i + halo)
-            load(ring, r, row[3 * (begin + halo) : 3 * (end + halo)], width)
-            load_ends(ring, r, row, beside[i + 1], begin + halo, end + halo)
-            p, q = o + FIRST, r + FIRST
+            load_row(q, row[3 * (begin + halo) : 3 * (end + halo)], width)
+            load_ends(q, row, beside[i + 1], begin + halo, end + halo)
             if i >= start:
-                load(corners, r, dual[i, 3 * begin : 3 * end + 3], width + ONE)
-                cell_roots(ring, p, q, corners, q, q + ONE, below, width)
+                load_row(b, dual[i, 3 * begin : 3 * end + 3], width + ONE)
+                across_rows(p, q, b, below, width)
             if i == start:
-                first_cells(ring, p, q, corners, q, below, part, width)
+                first_cells(p, q, b, below, part, width)
             elif i > start:
                 at = np.uint64((i - 1) * c + begin)
-                cell_roots(ring, p - ONE, p, corners, q, p, right, width + ONE)
-                weigh_cells(corners, p, q, below, right, part, weights, liu, Hn, H, normal, area, at, width)
-                cell_row(ring, p, q, corners, p, q, below, right, weights, part, liu, Hn, H, at, width)
-            o, r = r, o
+                along_row(p, a, b, right, width)
+                weigh_cells(a, b, below, right, part, weights, liu, Hn, H, normal, area, at, width)
+                cell_row(p, q, a, b, below, right, weights, part, liu, Hn, H, at, width)
+            p, q, a, b = q, p, b, a
 
 
 @inlined
 def two_corners(x, k, a, d, b, e, c):
     """Half fluxes into vertex k from its corners (a, d, b) and (b, e, c), and |n| of both: one division."""
     u, v, w, z = (
-        apart(x, d + k, k, SIDE),
-        apart(x, b + k, a + k, SIDE),
-        apart(x, e + k, k, SIDE),
-        apart(x, c + k, b + k, SIDE),
+        apart(x, d + k, x, k, SIDE),
+        apart(x, b + k, x, a + k, SIDE),
+        apart(x, e + k, x, k, SIDE),
+        apart(x, c + k, x, b + k, SIDE),
     )
     m, n = cross(u, v), cross(w, z)
     p, q = norm(m), norm(n)
@@ -417,8 +405,8 @@ def block(x, size, sums, weights, at, liu, Hn, H, normal, area):
         weigh(
             weights,
             k,
-            apart(x, a2 + k, a0 + k, SIDE),
-            apart(x, a3 + k, a1 + k, SIDE),
+            apart(x, a2 + k, x, a0 + k, SIDE),
+            apart(x, a3 + k, x, a1 + k, SIDE),
             liu,
             sums[k + A],
             Hn,
@@ -501,7 +489,7 @@ def conductance(u, v):
 def corner_weights(x, a, d, b, own, mixed, size):
     """Planes of `conductance` of the corner (a, d, b) of each vertex of a block."""
     for k in range(np.uint64(0), size):
-        own[k], mixed[k] = conductance(apart(x, d + k, k, SIDE), apart(x, b + k, a + k, SIDE))
+        own[k], mixed[k] = conductance(apart(x, d + k, x, k, SIDE), apart(x, b + k, x, a + k, SIDE))
 
 
 @helper
