@@ -36,7 +36,7 @@ Key = TypeVar("Key", str, tuple[int, str])
 REPORT = Path(__file__).with_name("PERFORMANCE.md")
 SIZES = (256, 1024, 2048)  # vertices in each direction: 65 thousand, 1 and 4 million
 PEERS = ("libigl", "vtk", "pymeshlab", "robust-laplacian", "scipy", "numpy", "numba")
-LOOP = 0.02  # seconds, of calls that are repeated
+LOOP = 0.1  # seconds, of calls that are repeated
 THESIS_OPERATIONS = 197  # a vertex, as the thesis counts its own implementation (above Figure 3.12)
 
 
@@ -163,8 +163,8 @@ def operations() -> dict[str, int]:
 def rounds(jobs: Mapping[Key, Job], count: int, loop: float = 0) -> dict[Key, Floats]:
     """Wall time of each job in each round; all run once beforehand.
 
-    A job runs until `loop` seconds have passed, and its last call counts. With 0 there is one call, which
-    finds its data in memory. After a pause threads are slow to wake; calls repeated in a loop do not see that.
+    A job runs until `loop` seconds have passed, and its last call counts: threads are slow to wake after a
+    pause, of which calls repeated in a loop see nothing. With 0 it is one call, from memory.
     """
     for job in jobs.values():
         job()
@@ -489,7 +489,7 @@ def markdown(
         "*repeated* moves the points of a mesh (`mesh.with_points(points)`, which checks them) and",
         "evaluates. A *copy* reads and writes the 24 + 24 bytes a vertex that the mean curvature normal",
         "reads and writes, on as many threads. Grids and copies are called once a round, and find their",
-        "data in memory. Face lists and their peers are called again until 20 ms have passed, and the last",
+        "data in memory. Face lists and their peers are called again until 0.1 s have passed, and the last",
         "call counts. *First call* is a fresh process, until its result is there.",
         "",
         f"Python {platform.python_version()}, {os.cpu_count()} cores, {versions()}.",

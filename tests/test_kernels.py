@@ -12,13 +12,14 @@ import time
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from pathlib import Path
+from types import FunctionType
 
 import numpy as np
 import pytest
 
 import quadcurv as qc
 from quadcurv import SCHEMES, QuadGrid, QuadMesh, StaggeredGrid
-from quadcurv.kernels import diamond, parallel
+from quadcurv.kernels import diamond, parallel, topology
 
 NAMES = ("mean_curvature", "mean_curvature_normal", "vertex_normals", "dual_areas")
 DIRECT = ("finite_volume", "liu")
@@ -229,6 +230,21 @@ def test_far_neighbours_are_brought_together(monkeypatch):
     assert np.median(np.abs(ring[regular] - np.flatnonzero(regular)[:, None])) < 100
     for name in NAMES:
         np.testing.assert_array_equal(first[name], second[name])
+
+
+@pytest.mark.parametrize(("patch", "near"), [(1, 0), (50, 0.8), (700, 0.95), (10_000, 1)])
+def test_patches_hold_every_vertex_once_and_keep_neighbours_together(patch, near):
+    code = {name: f.py_func for name, f in vars(topology).items() if hasattr(f, "py_func")}
+    names = {**vars(topology), "PATCH": patch}
+    names.update({name: FunctionType(f.__code__, names) for name, f in code.items()})
+    points, faces = sheet((40, 50), n_triangles=30, hole=True)
+    ring = QuadMesh(points, faces).ring_order()[1]
+    order = names["nearby_order"](ring)
+    assert sorted(order) == list(range(len(points)))
+    regular = np.flatnonzero(ring[:, 0] >= 0)
+    place = np.argsort(order)
+    apart = np.abs(place[ring[regular, ::2]] - place[regular, None])
+    assert (apart < patch).mean() >= near  # 5 % and 58 % for 50 and 700 in random order
 
 
 def large_and_serial():
