@@ -563,7 +563,8 @@ def plots(output: Path, ratios: list[Ratio], times: dict[str, dict[int, dict[str
                 sizes, nanoseconds, label=name.replace("finite_volume", "FV").replace("liu", "Liu"), **style
             )
         axes.set(xscale="log", yscale="log", xlabel="vertices", title=title)
-        axes.legend(fontsize=7)
+    left.legend(fontsize=7, loc="upper right")
+    right.legend(fontsize=7, loc="lower right", ncols=2)
     left.set_ylabel("time per vertex (ns)")
     save_figure(fig, output, "performance-time")
 
