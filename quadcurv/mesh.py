@@ -394,6 +394,13 @@ class QuadMesh:
             self._shared[name] = make()
         return self._shared[name]
 
+    @property
+    def distance(self) -> float:
+        """Mean distance in memory of neighbours, in vertices."""
+        from quadcurv.kernels import topology
+
+        return float(self.remember("distance", lambda: topology.mean_distance(self.faces)))
+
     def ring_order(self) -> tuple[Ints | None, Ints]:
         """Rings (n, 8) of the regular vertices inside, first -1 for all others; and an order of them.
 
@@ -406,7 +413,7 @@ class QuadMesh:
         shared = self._shared
         if "order" not in shared and shared.setdefault("uses", 0) > 0:
             order = None
-            if topology.mean_distance(self._ring) > _FAR:
+            if self.distance > _FAR:
                 order = topology.nearby_order(self._ring)
                 shared["ring"] = topology.renumbered(self._ring, order)
             shared["order"] = order

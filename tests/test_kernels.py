@@ -232,6 +232,17 @@ def test_far_neighbours_are_brought_together(monkeypatch):
         np.testing.assert_array_equal(first[name], second[name])
 
 
+def test_asking_for_memory_ahead_changes_nothing(monkeypatch):
+    points, faces = sheet((40, 50), n_triangles=30, hole=True)
+    before = qc.evaluate(QuadMesh(points, faces), *NAMES)
+    monkeypatch.setattr(topology, "FAR", -1)
+    mesh = QuadMesh(points, faces)
+    assert mesh.distance == pytest.approx(2000 / 3, rel=0.2)  # of two random numbers below 2000
+    after = qc.evaluate(mesh, *NAMES)
+    for name in NAMES:
+        np.testing.assert_array_equal(before[name], after[name])
+
+
 @pytest.mark.parametrize(("patch", "near"), [(1, 0), (50, 0.8), (700, 0.95), (10_000, 1)])
 def test_patches_hold_every_vertex_once_and_keep_neighbours_together(patch, near):
     code = {name: f.py_func for name, f in vars(topology).items() if hasattr(f, "py_func")}

@@ -25,10 +25,11 @@ from math import nan, sqrt
 
 import numpy as np
 
-from quadcurv.kernels.compiled import helper, inlined, kernel
+from quadcurv.kernels.compiled import helper, inlined, kernel, prefetch
 
 WIDTH = 2048  # columns done at once: their rows stay in the second-level cache
 BLOCK = 64  # vertices of a face list done at once: their rings stay in the first-level cache
+AHEAD = 16  # vertices: where the points of rings lie far apart, they are asked for that early
 LEAST_ROWS = 64  # of a range of its own, which computes a row of quads that others compute too
 STRIDE = WIDTH + 16
 FIRST = np.uint64(8)  # place of the first vertex in a plane, its left neighbour before it
@@ -446,7 +447,7 @@ def put(block, order, begin, end, width, values):
 
 
 @kernel
-def rings(points, ring, order, liu, Hn, H, normal, area, start, stop):
+def rings(points, ring, order, far, liu, Hn, H, normal, area, start, stop):
     """As `vertices`, of the regular vertices start..stop of a face list.
 
     Parameters
@@ -457,6 +458,8 @@ def rings(points, ring, order, liu, Hn, H, normal, area, start, stop):
         regular, whose results are NaN.
     order : (n,) int32 or None
         Place in the results of each vertex; None: its own.
+    far : bool
+        Whether neighbours are far apart in `points`.
     liu, Hn, H, normal, area, start, stop
         As for `vertices`.
     """
@@ -467,6 +470,10 @@ def rings(points, ring, order, liu, Hn, H, normal, area, start, stop):
         end = min(begin + BLOCK, stop)
         size = np.uint64(end - begin)
         for k in range(end - begin):
+            ahead = begin + k + AHEAD
+            if far and ahead < stop and ring[ahead, 0] >= 0:
+                for j in range(8):
+                    prefetch(points, 3 * ring[ahead, j])
             gather_ring(points, ring, begin + k, x, np.uint64(k))
         if order is None:
             block(x, size, sums, weights, np.uint64(begin), liu, Hn, H, normal, area)

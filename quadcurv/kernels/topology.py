@@ -8,9 +8,11 @@ from functools import partial
 import numpy as np
 
 from quadcurv.kernels import parallel
-from quadcurv.kernels.compiled import helper, kernel
+from quadcurv.kernels.compiled import helper, kernel, prefetch
 
 ISOLATED, INTERIOR, BOUNDARY, SEVERAL_FANS = 0, 1, 2, 3
+FAR = 10_000  # vertices between neighbours in memory, on average, that are in no cache
+AHEAD = 16  # faces or vertices: where what is read next lies far apart, it is asked for that early
 PATCH = 65536  # vertices: one step of breadth-first order through them stays in the first-level cache
 
 
@@ -62,9 +64,24 @@ def corners_by_vertex(faces, n):
 
 
 @kernel
-def first_corners(faces, ring, valence):
+def mean_distance(faces):
+    """Mean distance in memory of a face's first two vertices, in vertices; of every 16th face."""
+    total = count = 0
+    for f in range(0, faces.shape[0], 16):
+        total += abs(faces[f, 1] - faces[f, 0])
+        count += 1
+    return total / max(count, 1)
+
+
+@kernel
+def first_corners(faces, far, ring, valence):
     """Put the first four corners of every vertex into its row of `ring`, and count them as far as five."""
     for f in range(faces.shape[0]):
+        if far and f + AHEAD < faces.shape[0]:
+            for s in range(4):
+                v = max(faces[f + AHEAD, s], 0)
+                prefetch(ring, 8 * v)
+                prefetch(valence, v)
         for s in range(4):
             v = faces[f, s]
             if v >= 0 and valence[v] < 5:
@@ -74,7 +91,7 @@ def first_corners(faces, ring, valence):
 
 
 @kernel
-def regular_rings(faces, valence, ring, start, stop):
+def regular_rings(faces, far, valence, ring, start, stop):
     """Rings (a, d, a, d, ...) of vertices start..stop inside four quads that run the same way round.
 
     Counter-clockwise from the first corner, eight vertices, where `first_corners` has put corners. A first
@@ -82,6 +99,9 @@ def regular_rings(faces, valence, ring, start, stop):
     """
     corners = np.empty(4, np.int32)
     for v in range(start, stop):
+        if far and v + AHEAD < stop and valence[v + AHEAD] == 4:
+            for k in range(4):
+                prefetch(faces, ring[v + AHEAD, k])
         if valence[v] != 4:
             ring[v, 0] = -1
             continue
@@ -116,9 +136,9 @@ def regular_rings(faces, valence, ring, start, stop):
 
 def rings(faces, n):
     """Ring (n, 8) int32 of every vertex, see `regular_rings`."""
-    ring, valence = np.empty((n, 8), np.int32), np.zeros(n, np.uint8)
-    first_corners(faces, ring, valence)
-    parallel.over(partial(regular_rings, faces, valence, ring), n, n)
+    ring, valence, far = np.empty((n, 8), np.int32), np.zeros(n, np.uint8), mean_distance(faces) > FAR
+    first_corners(faces, far, ring, valence)
+    parallel.over(partial(regular_rings, faces, far, valence, ring), n, n)
     return ring
 
 
@@ -146,17 +166,6 @@ def fans(faces, n):
     if bad_edge[2]:
         bad_edge[:2] = kept[bad_edge[:2]]
     return ring, others, kind, bad_edge, n_disagree
-
-
-@kernel
-def mean_distance(ring):
-    """Mean distance in memory of a regular vertex and its first neighbour, in vertices; of every 16th."""
-    total = count = 0
-    for v in range(0, ring.shape[0], 16):
-        if ring[v, 0] >= 0:
-            total += abs(ring[v, 0] - v)
-            count += 1
-    return total / max(count, 1)
 
 
 @kernel

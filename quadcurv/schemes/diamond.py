@@ -119,13 +119,13 @@ def write(mesh: Mesh, frame: Frame | None, results: dict[str, Floats], *, liu: i
 
 def _write_rings(mesh: QuadMesh, liu: int | None, wanted: list[Floats | None]) -> None:
     """Regular vertices, in an order that keeps neighbours close where the mesh's own does not."""
-    from quadcurv.kernels import diamond, parallel
+    from quadcurv.kernels import diamond, parallel, topology
 
     n = len(mesh.points)
     order, ring = mesh.ring_order()
-    points = mesh.points.ravel()
+    points, far = mesh.points.ravel(), order is None and mesh.distance > topology.FAR
     if order is not None:
         points = np.empty(3 * n)
         parallel.over(partial(diamond.gather, mesh.points.ravel(), order, points), n, n)
-    kernel = partial(diamond.rings, points, ring, order, liu, *wanted)
+    kernel = partial(diamond.rings, points, ring, order, far, liu, *wanted)
     parallel.over(kernel, n, _RING_WORK * n, diamond.BLOCK)
