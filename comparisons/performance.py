@@ -18,7 +18,7 @@ from dataclasses import dataclass
 from functools import partial
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
-from types import FunctionType
+from types import FunctionType, ModuleType
 from typing import Any, TypeVar
 
 import numpy as np
@@ -103,6 +103,19 @@ def numpy_finite_volume(points: Floats) -> Floats:
     return flux / (2 * area)
 
 
+def interpreted(module: ModuleType, **instead: Any) -> dict[str, Any]:
+    """What is in a module of kernels, these as plain Python that calls plain Python; some names replaced."""
+    kernels = {name: f.py_func for name, f in vars(module).items() if hasattr(f, "py_func")}
+    names = {**vars(module), **instead}
+    names.update({name: FunctionType(f.__code__, names) for name, f in kernels.items()})
+    return names
+
+
+def short(name: str) -> str:
+    """A name as figures have it."""
+    return name.replace("finite_volume", "FV").replace("liu", "Liu")
+
+
 def operations() -> dict[str, int]:
     """Floating-point operations a vertex of H n on a grid, counted while the kernels' own code runs.
 
@@ -135,9 +148,7 @@ def operations() -> dict[str, int]:
         count += 1
         return Counted(np.sqrt(x))
 
-    python = {name: f.py_func for name, f in vars(diamond).items() if hasattr(f, "py_func")}
-    names = {**vars(diamond), "sqrt": root}
-    names.update({name: FunctionType(f.__code__, names) for name, f in python.items()})
+    names = interpreted(diamond, sqrt=root)
 
     def run(name: str, *given: Any) -> int:
         nonlocal count
@@ -559,9 +570,7 @@ def plots(output: Path, ratios: list[Ratio], times: dict[str, dict[int, dict[str
                 continue
             nanoseconds = [np.median(by_size[n][name]) / n * 1e9 for n in sizes]
             style = {"color": COLOURS[i % len(COLOURS)], "marker": MARKERS[i % len(MARKERS)]}
-            axes.plot(
-                sizes, nanoseconds, label=name.replace("finite_volume", "FV").replace("liu", "Liu"), **style
-            )
+            axes.plot(sizes, nanoseconds, label=short(name), **style)
         axes.set(xscale="log", yscale="log", xlabel="vertices", title=title)
     left.legend(fontsize=7, loc="upper right")
     right.legend(fontsize=7, loc="lower right", ncols=2)
@@ -578,9 +587,7 @@ def plots(output: Path, ratios: list[Ratio], times: dict[str, dict[int, dict[str
         axes.plot(share[1], i, "o", color=COLOURS[0], label="measured, quartiles" if i == 0 else None)
         axes.plot(share[3], i, "|", color=COLOURS[1], markersize=10, label="aim" if i == 0 else None)
     axes.axvline(1, color=COLOURS[6], linewidth=0.9, label="must")
-    labels = [
-        f"{r.name} / {r.against}".replace("finite_volume", "FV").replace("liu", "Liu") for r in goals.values()
-    ]
+    labels = [short(f"{r.name} / {r.against}") for r in goals.values()]
     axes.set(
         xscale="log", xlabel="times better than it must be", yticks=range(len(goals)), yticklabels=labels
     )

@@ -12,12 +12,12 @@ import time
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from pathlib import Path
-from types import FunctionType
 
 import numpy as np
 import pytest
 
 import quadcurv as qc
+from comparisons.performance import interpreted
 from quadcurv import SCHEMES, QuadGrid, QuadMesh, StaggeredGrid
 from quadcurv.kernels import diamond, parallel, topology
 
@@ -245,12 +245,9 @@ def test_asking_for_memory_ahead_changes_nothing(monkeypatch):
 
 @pytest.mark.parametrize(("patch", "near"), [(1, 0), (50, 0.8), (700, 0.95), (10_000, 1)])
 def test_patches_hold_every_vertex_once_and_keep_neighbours_together(patch, near):
-    code = {name: f.py_func for name, f in vars(topology).items() if hasattr(f, "py_func")}
-    names = {**vars(topology), "PATCH": patch}
-    names.update({name: FunctionType(f.__code__, names) for name, f in code.items()})
     points, faces = sheet((40, 50), n_triangles=30, hole=True)
     ring = QuadMesh(points, faces).ring_order()[1]
-    order = names["nearby_order"](ring)
+    order = interpreted(topology, PATCH=patch)["nearby_order"](ring)
     assert sorted(order) == list(range(len(points)))
     regular = np.flatnonzero(ring[:, 0] >= 0)
     place = np.argsort(order)
