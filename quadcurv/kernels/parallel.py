@@ -67,10 +67,12 @@ def over(kernel, size, work, least=1):
     if count == 1 or work < SERIAL_BELOW or size < 2 * least:
         kernel(0, size)
         return
-    # A few ranges a thread, so that one that is held up does not hold up all.
-    parts = min(8 * count, size // least)
-    cuts = [size * k // parts for k in range(parts + 1)]
-    left = deque(pairwise(cuts))
+    # Ever smaller ranges: whichever thread is held up, all end at about the same time.
+    least = max(least, size // (32 * count))
+    cuts = [0]
+    while size - cuts[-1] >= 2 * least:
+        cuts.append(cuts[-1] + max((size - cuts[-1]) // (2 * count), least))
+    left = deque(pairwise([*cuts, size]))
 
     def take():
         while left:
@@ -87,7 +89,7 @@ def over(kernel, size, work, least=1):
     try:
         if _pool is None or _pool._max_workers != count - 1:
             _pool = ThreadPoolExecutor(count - 1, thread_name_prefix="quadcurv")
-        for _ in range(min(count, parts) - 1):
+        for _ in range(min(count, len(cuts)) - 1):
             helpers.append(_pool.submit(take))
     except RuntimeError:  # the interpreter shuts down, or the system has no thread left
         pass
