@@ -205,21 +205,17 @@ def frame(grid: QuadGrid | StaggeredGrid, boundary: str = "extrapolate") -> Fram
     if boundary == "extrapolate":
         _require(points.shape[:2], grid.wrap, DEGREE)
 
-    def ends(x: Floats, wraps: bool) -> Floats:
-        """Rows before the first and after the last one."""
-        if wraps:
-            return np.stack((x[-1], x[0]))
-        if boundary == "nan":
-            return np.full((2, *x[0].shape), np.nan)
-        near = np.stack((x[: DEGREE + 1], x[: -DEGREE - 2 : -1]), axis=1)
-        return near[0] + np.tensordot(_weights(DEGREE), near - near[0], 1)  # an offset costs no digits
-
-    beyond = ends(points, grid.wrap[0])
-    column = np.arange(points.shape[1])
-    ends_of_rows = column[np.minimum(column, column[::-1]) <= (0 if grid.wrap[1] else DEGREE)]
-    sides = np.concatenate([x[:, ends_of_rows] for x in (beyond[:1], points, beyond[1:])])
-    beside = ends(sides.swapaxes(0, 1), grid.wrap[1]).swapaxes(0, 1)
-    return Frame(beyond.reshape(2, -1), np.ascontiguousarray(beside))
+    across = np.zeros(0) if grid.wrap[1] else np.array([np.nan]) if boundary == "nan" else _weights(DEGREE)
+    if grid.wrap[0]:
+        beyond = points[[-1, 0]]
+    elif boundary == "nan":
+        beyond = np.full((2, *points.shape[1:]), np.nan)
+    else:
+        beyond = points[[0, -1]]
+        for row, near in zip(beyond, (points, points[::-1]), strict=True):
+            for k, weight in enumerate(_weights(DEGREE)[1:], 1):
+                row += weight * (near[k] - near[0])  # an offset costs no digits
+    return Frame(beyond.ravel(), across)
 
 
 def _require(shape: tuple[int, ...], wrap: tuple[bool, bool], degree: int) -> None:

@@ -71,14 +71,15 @@ class Frame(NamedTuple):
 
     Attributes
     ----------
-    beyond : (2, 3 c) float64
+    beyond : (6 c,) float64
         The rows before the first and after the last one.
-    beside : (r + 2, 2, 3) float64
-        The points before the first and after the last column, from the row before the first one on.
+    across : (k,) float64
+        The point before the first one of a row is x_0 + sum of across_k (x_k - x_0), that after the last
+        one alike; empty where rows are closed.
     """
 
     beyond: Floats
-    beside: Floats
+    across: Floats
 
 
 @dataclass(frozen=True, eq=False)
@@ -401,22 +402,22 @@ class QuadMesh:
 
         return float(self.remember("distance", lambda: topology.mean_distance(self.faces)))
 
-    def ring_order(self) -> tuple[Ints | None, Ints]:
+    def ring_order(self) -> tuple[tuple[Ints, Ints] | None, Ints]:
         """Rings (n, 8) of the regular vertices inside, first -1 for all others; and an order of them.
 
-        The order is None for that of the vertices; else rings are in it, numbered by it. It pays on large
-        meshes whose neighbours are far apart in memory, and takes the time of several evaluations: it
-        is made the second time that a connectivity is used.
+        The order is None for that of the vertices; else rings are in it, numbered by it, and it comes with
+        the place of every vertex in it. It pays on large meshes whose neighbours are far apart in memory,
+        and takes the time of several evaluations: it is made the second time that a connectivity is used.
         """
         from quadcurv.kernels import topology
 
         shared = self._shared
         if "order" not in shared and shared.setdefault("uses", 0) > 0:
-            order = None
+            shared["order"] = None
             if self.distance > _FAR:
                 order = topology.nearby_order(self._ring)
-                shared["ring"] = topology.renumbered(self._ring, order)
-            shared["order"] = order
+                shared["ring"], place = topology.renumbered(self._ring, order)
+                shared["order"] = order, place
         shared["uses"] = 1
         return shared.get("order"), shared.get("ring", self._ring)
 

@@ -15,11 +15,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from llvmlite.binding import get_host_cpu_features
+from numba import config, njit
 
 import quadcurv as qc
 from comparisons.performance import interpreted
 from quadcurv import SCHEMES, QuadGrid, QuadMesh, StaggeredGrid
-from quadcurv.kernels import diamond, parallel, topology
+from quadcurv.kernels import compiled, diamond, parallel, topology
 
 NAMES = ("mean_curvature", "mean_curvature_normal", "vertex_normals", "dual_areas")
 DIRECT = ("finite_volume", "liu")
@@ -167,6 +169,75 @@ def test_extraordinary_isolated_and_non_orientable(scheme):
     assert np.nanmin(H) >= 0
 
 
+@njit
+def reciprocal_roots(x):
+    """`diamond.reciprocal_root` of all numbers."""
+    y = np.empty_like(x)
+    for k in range(x.size):
+        y[k] = diamond.reciprocal_root(x[k])
+    return y
+
+
+def test_reciprocal_roots_are_right_to_the_last_digit_or_two():
+    """The guess depends on two octaves, the exponent is halved; the rest of the range is sampled."""
+    rng = np.random.default_rng(0)
+    x = np.concatenate((np.linspace(1, 4, 300_001), np.exp(rng.uniform(-708, 709, 100_000)), [diamond.LEAST]))
+    y = reciprocal_roots(x)
+    exact = 1 / np.sqrt(x.astype(np.longdouble))
+    assert np.abs(y / exact - 1).max() < 4 * 2.0**-53  # 1.25 where products and sums are rounded once
+    assert np.isnan(reciprocal_roots(np.array([np.nan, np.inf]))).all()
+    assert np.isfinite(reciprocal_roots(np.array([0, 5e-324]))).all()  # so that 0 has the root 0
+
+
+@pytest.mark.parametrize("scheme", DIRECT)
+@pytest.mark.parametrize("size", [1e-70, 1e-30, 1e30, 1e68])
+def test_sizes_far_from_one(scheme, size):
+    """The square of u x v is that of an area: the fourth power of a length."""
+    points = rough((12, 14))
+    H = qc.mean_curvature(QuadGrid(points), scheme)
+    for mesh in (QuadGrid(size * points), QuadGrid(size * points).to_mesh()):
+        scaled = qc.mean_curvature(mesh, scheme).reshape(H.shape)
+        np.testing.assert_allclose(scaled * size, H, rtol=0, atol=1e-12 * np.abs(H).max())
+
+
+def test_products_and_sums_are_rounded_once_or_twice():
+    a, b = 1 + 2.0**-30, 1 - 2.0**-30  # a b = 1 - 2^-60, rounded 1
+    assert njit(lambda a, b, c: compiled.muladd(a, b, c))(a, b, -1.0) in (0.0, -(2.0**-60))
+
+
+def test_loops_are_as_wide_as_the_processor():
+    """`wide` goes by a name that llvmlite does not know: an upgrade could lose it, and much of the speed."""
+
+    @njit
+    def double(x, y):
+        compiled.wide()
+        for k in range(x.size):
+            y[k] = 2 * x[k]
+
+    double(np.ones(8), np.ones(8))
+    if config.CPU_FEATURES is not None or not get_host_cpu_features().get("avx512f", False):
+        pytest.skip("no AVX-512")
+    assert "zmm" in double.inspect_asm(double.signatures[0])
+
+
+@pytest.mark.parametrize(("size", "least"), [(1, 1), (31, 16), (32, 16), (1000, 16), (10**6, 64), (7, 100)])
+@pytest.mark.parametrize("threads", [2, 3, 16])
+def test_ranges_become_smaller_and_make_up_the_whole(size, least, threads, monkeypatch):
+    monkeypatch.setattr(parallel, "SERIAL_BELOW", 0)
+    done = []
+    qc.set_threads(threads)
+    parallel.over(lambda start, stop: done.append((start, stop)), size, size, least)
+    done.sort()
+    assert [start for start, _ in done] == [0, *(stop for _, stop in done[:-1])]
+    assert done[-1][1] == size
+    rows = np.array([stop - start for start, stop in done])
+    assert (rows >= min(least, size)).all()
+    assert (np.diff(rows[:-1]) <= 0).all()
+    if size >= 100 * threads * least:
+        assert rows.max() <= size / 2 / threads
+        assert rows.min() <= size / 16 / threads
+
+
 @pytest.mark.parametrize("threads", [1, 2, 3, 7])
 @pytest.mark.parametrize("scheme", DIRECT)
 def test_results_are_bitwise_the_same_for_any_number_of_threads(scheme, threads, monkeypatch):
@@ -224,7 +295,8 @@ def test_far_neighbours_are_brought_together(monkeypatch):
     monkeypatch.setattr("quadcurv.mesh._FAR", 0)
     again = mesh.with_points(points)
     second = qc.evaluate(again, *NAMES)
-    order, ring = again.ring_order()
+    (order, place), ring = again.ring_order()
+    np.testing.assert_array_equal(order[place], np.arange(len(points)))
     assert sorted(order) == list(range(len(points)))
     regular = ring[:, 0] >= 0
     assert np.median(np.abs(ring[regular] - np.flatnonzero(regular)[:, None])) < 100
@@ -379,9 +451,9 @@ def test_compiled_code_is_not_stale_after_an_edit(copy):
 @pytest.mark.slow
 def test_nothing_needs_to_be_writeable(copy):
     before = run(copy)
-    for compiled in (copy / "quadcurv").rglob("__pycache__"):
-        shutil.rmtree(compiled)
-        compiled.write_text("a file, so that no folder can be made here")
+    for folder in (copy / "quadcurv").rglob("__pycache__"):
+        shutil.rmtree(folder)
+        folder.write_text("a file, so that no folder can be made here")
     nowhere = str(copy / "file")
     Path(nowhere).write_text("")
     assert run(copy, HOME=nowhere, XDG_CACHE_HOME=nowhere, NUMBA_CACHE_DIR="") == before

@@ -1,10 +1,10 @@
 """Finite-volume and Liu's operators: one diamond flux, two dual areas.
 
-With a quad's diagonals u and v, n = u x v and |n| twice its area, half the finite-volume flux into its
-first vertex is (v x n) / (2 |n|) and into its second (n x u) / (2 |n|); the opposite vertices get the
-same with the other sign. This is Liu's alpha (a - c) + beta (b - c) + gamma (d - c) at every corner, and
-(a^11 t1 + a^12 t2) / |t^(1)| |t2| / 2 of the finite-volume scheme with t1 = d - c, t2 = b - a.
-|n| rather than the Gram determinant (thesis, eq. 3.27): no cancellation.
+With a quad's diagonals u and v and its unit normal n, along u x v, the finite-volume flux into its first
+vertex is v x n and into its second n x u; the opposite vertices get the same with the other sign. This is
+twice Liu's alpha (a - c) + beta (b - c) + gamma (d - c) at every corner, and
+(a^11 t1 + a^12 t2) / |t^(1)| |t2| of the finite-volume scheme with t1 = d - c, t2 = b - a.
+|u x v| rather than the Gram determinant (thesis, eq. 3.27): no cancellation.
 
 The loops over grids and over rings are written for the compiler to vectorise and the processor to overlap:
 
@@ -14,9 +14,13 @@ The loops over grids and over rings are written for the compiler to vectorise an
   end of an array and becomes a gather.)
 * On grids the fluxes of the quad before are carried from one turn of the loop to the next instead of
   stored, which the compiler knows how to shift along its vectors.
-* Roots and divisions have loops of their own, which leave them in the second-level cache. (With them the
-  way from points to result takes 90 cycles, and a processor that looks 250 instructions ahead would see a
-  single turn of the loop, and wait. Computing u x v a second time costs less.)
+* Normals, roots and fluxes have loops of their own. (A processor keeps about a hundred operations that
+  wait for others. A turn of one loop that did it all would be a chain of 150 cycles, of which hardly two
+  overlapped.) The loops follow each other on short stretches of a row: what one leaves for the next stays
+  near, and memory is read and written evenly, ahead of its use.
+* Roots are Newton's rather than the processor's, which take five cycles a number whatever else is done.
+* Planes of a grid begin where a page of memory begins, or in its middle. (A load that follows a store to
+  the same place of another page waits for it; so placed, loads keep ahead of stores.)
 
 Every vertex sums its quads in the same order however the work is cut: results are bitwise the same.
 """
@@ -25,17 +29,37 @@ from math import nan, sqrt
 
 import numpy as np
 
-from quadcurv.kernels.compiled import helper, inlined, kernel, prefetch
+from quadcurv.kernels.compiled import helper, inlined, kernel, muladd, prefetch, prefetch_to_write, wide
 
 WIDTH = 2048  # columns done at once: their rows stay in the second-level cache
+STRETCH = 80  # of them, by one loop after the other: what these leave stays in the first-level cache
 BLOCK = 64  # vertices of a face list done at once: their rings stay in the first-level cache
 AHEAD = 16  # vertices: where the points of rings lie far apart, they are asked for that early
-LEAST_ROWS = 64  # of a range of its own, which computes a row of quads that others compute too
-STRIDE = WIDTH + 16
+LEAST_ROWS = 16  # of a range of its own, which computes a row of quads that others compute too
+PAGE = 512  # doubles
+STRIDE = WIDTH + PAGE // 2  # between planes of a row
+SHORT = STRETCH + 16  # between planes of a stretch
+MAGIC = np.uint64(0x5FE6EB50C7B537A9)  # M. Robertson, A Brief History of InvSqrt, 2012
+LEAST = 2.2250738585072014e-308  # of the numbers whose exponent is not that of zero
 FIRST = np.uint64(8)  # place of the first vertex in a plane, its left neighbour before it
 ONE, TWO, THREE = np.uint64(1), np.uint64(2), np.uint64(3)
-Y, Z, A = np.uint64(STRIDE), np.uint64(2 * STRIDE), np.uint64(3 * STRIDE)
+Y, Z, A, S = np.uint64(STRIDE), np.uint64(2 * STRIDE), np.uint64(3 * STRIDE), np.uint64(SHORT)
+LENGTH, RING, EDGE = np.uint64(3 * SHORT), np.uint64(4 * SHORT), np.uint64(8 * SHORT)
+U, V = np.uint64(8 * SHORT), np.uint64(11 * SHORT)
 SIDE, TWICE, POINT = np.uint64(BLOCK), np.uint64(2 * BLOCK), np.uint64(3 * BLOCK)
+CORNERS = np.uint64(4 * BLOCK)
+
+
+@inlined
+def triple(x, i, plane):
+    """Point i of planes."""
+    return x[i], x[i + plane], x[i + TWO * plane]
+
+
+@inlined
+def place(x, i, plane, a):
+    """Make a triple point i of planes."""
+    x[i], x[i + plane], x[i + TWO * plane] = a
 
 
 @inlined
@@ -46,7 +70,7 @@ def apart(x, i, y, j, plane):
 
 @inlined
 def cross(a, b):
-    """Cross product of two triples."""
+    """Cross product of two triples, zero where they are equal: its products are rounded alike."""
     return (
         a[1] * b[2] - a[2] * b[1],
         a[2] * b[0] - a[0] * b[2],
@@ -55,9 +79,19 @@ def cross(a, b):
 
 
 @inlined
+def fused_cross(a, b):
+    """Cross product of two triples; equal ones may leave a rounding error."""
+    return (
+        muladd(a[1], b[2], -(a[2] * b[1])),
+        muladd(a[2], b[0], -(a[0] * b[2])),
+        muladd(a[0], b[1], -(a[1] * b[0])),
+    )
+
+
+@inlined
 def dot(a, b):
     """Inner product of two triples."""
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+    return muladd(a[0], b[0], muladd(a[1], b[1], a[2] * b[2]))
 
 
 @inlined
@@ -68,181 +102,292 @@ def norm(a):
 
 @inlined
 def quotient(x, y):
-    """Quotient by a positive y, else NaN: where an area underflows, u x v does not vanish."""
+    """Quotient by a positive y, else NaN."""
     return x / y if y > 0 else nan
 
 
 @inlined
-def half_fluxes(u, v, scale):
-    """Half fluxes into a quad's first and second vertex from its diagonals; scale is 1 / (2 |u x v|)."""
-    n = cross(u, v)
-    n = n[0] * scale, n[1] * scale, n[2] * scale
-    return cross(v, n), cross(n, u)
+def guess(x):
+    """1 / sqrt(x) to 3.4 %: minus half the exponent, and straight lines for the fraction."""
+    half = np.float64(x).view(np.uint64) >> ONE
+    return np.uint64(MAGIC - half).view(np.float64)
 
 
 @inlined
-def weigh(weights, i, a, b, liu, lengths, Hn, H, normal, area, k):
-    """Put what a sum of half fluxes is multiplied by at place i; write normal and area of vertex k.
+def reciprocal_root(x):
+    """1 / sqrt(x) to the last digit or two; if x is zero or as good as zero, some large number.
 
-    The dual area is |a x b| / 4, in Liu's formula lengths / 8. The first plane of weights makes Hn, the
-    others H. What is not wanted is None.
+    Two steps y (1 - e)^(-1/2), e = 1 - x y^2: by the quadratic that is nearest where the guess leaves e, to
+    2.5e-5, and by the series, of which 2e-18 is left out.
     """
-    n = cross(a, b)
+    y = guess(x)
+    e = muladd(-(x * y), y, 1.0)
+    y *= muladd(e, muladd(e, 0.375131542, 0.501100402), 1.000000670)
+    e = muladd(-(x * y), y, 1.0)
+    return muladd(y * e, muladd(e, muladd(e, 0.3125, 0.375), 0.5), y)
+
+
+@inlined
+def unless_zero(x, square):
+    """The number x, but NaN where a square is zero or as good as zero."""
+    return x if square >= LEAST else nan
+
+
+@inlined
+def unit(n):
+    """A triple over its length, NaN if that is zero, and the length."""
     square = dot(n, n)
-    length = sqrt(square)
-    unit = quotient(1, length)
-    scale = 2 * unit if liu is None else quotient(4, lengths)  # 1 / (2 dual area)
-    if Hn is not None:
-        weights[i] = scale
-    if H is not None:
-        along = quotient(-2, square) if liu is None else -scale * unit  # the former has no root
-        weights[i + Y] = along * n[0]
-        weights[i + Z] = along * n[1]
-        weights[i + A] = along * n[2]
-    if normal is not None:
-        normal[THREE * k] = n[0] * unit
-        normal[THREE * k + ONE] = n[1] * unit
-        normal[THREE * k + TWO] = n[2] * unit
-    if area is not None:
-        area[k] = 0.25 * length if liu is None else 0.125 * lengths
+    scale = reciprocal_root(square)
+    length, scale = square * scale, unless_zero(scale, square)
+    return (n[0] * scale, n[1] * scale, n[2] * scale), length
 
 
 @inlined
-def finish(tx, ty, tz, weights, i, Hn, H, k):
-    """Write the curvatures of vertex k from the sum t of its half fluxes and the weights at place i."""
-    if Hn is not None:
-        Hn[THREE * k] = tx * weights[i]
-        Hn[THREE * k + ONE] = ty * weights[i]
-        Hn[THREE * k + TWO] = tz * weights[i]
-    if H is not None:
-        H[k] = tx * weights[i + Y] + ty * weights[i + Z] + tz * weights[i + A]
+def fluxes(u, v, n):
+    """Fluxes into a quad's first and second vertex from its diagonals and its unit normal."""
+    return fused_cross(v, n), fused_cross(n, u)
 
 
 @inlined
-def quad(p, q, i):
-    """Diagonals of the quad whose first two vertices are at i in rows p and q, the others beside them."""
-    return apart(q, i + ONE, p, i, Y), apart(p, i + ONE, q, i, Y)
+def enclose(ring, i, plane, a, b, liu, H, normal):
+    """Keep n = a x b of the diagonals of a vertex's ring polygon, as far as it is wanted, and n . n."""
+    if liu is None or H is not None or normal is not None:
+        n = cross(a, b)
+        ring[i + THREE * plane] = dot(n, n)
+        if H is not None or normal is not None:
+            place(ring, i, plane, n)
 
 
 @inlined
-def root(roots, i, u, v):
-    """Put 1 / (2 |u x v|) and |u x v| at place i."""
-    length = norm(cross(u, v))
-    roots[i] = quotient(0.5, length)
-    roots[i + Y] = length
+def weigh(ring, i, plane, lengths, liu, H, normal, area, k):
+    """What the sum of fluxes is multiplied by, in the fourth plane; write normal and area of vertex k.
 
-
-@inlined
-def load(planes, i, row, k):
-    """Put point k of a row at place i of the planes."""
-    planes[i] = row[THREE * k]
-    planes[i + Y] = row[THREE * k + ONE]
-    planes[i + Z] = row[THREE * k + TWO]
-
-
-@helper
-def root_row(p, q, roots, row, fresh, width):
-    """`root` of the quads between two rows, from the one before the first.
-
-    `row`, the one after q, becomes planes on the way: it arrives from memory while the roots are computed.
+    Before it, `ring` holds what `enclose` left there. The dual area is a quarter of the length of n, in
+    Liu's formula lengths / 8. What is not wanted is None.
     """
-    u, v = quad(p, q, FIRST - ONE)
-    root(roots, FIRST - ONE, u, v)
-    for k in range(np.uint64(0), width):
-        u, v = quad(p, q, FIRST + k)
-        root(roots, FIRST + k, u, v)
-        load(fresh, FIRST + k, row, k)
+    scale = nan
+    if liu is None or H is not None or normal is not None:
+        square = ring[i + THREE * plane]
+        scale = reciprocal_root(square)
+        if liu is None and area is not None:
+            area[k] = 0.25 * square * scale
+        scale = unless_zero(scale, square)
+        if H is not None or normal is not None:
+            n = triple(ring, i, plane)
+            n = n[0] * scale, n[1] * scale, n[2] * scale
+            place(ring, i, plane, n)
+        if normal is not None:
+            normal[THREE * k], normal[THREE * k + ONE], normal[THREE * k + TWO] = n
+    if liu is not None:
+        scale = quotient(2, lengths)
+        if area is not None:
+            area[k] = 0.125 * lengths
+    ring[i + THREE * plane] = scale
+
+
+@inlined
+def finish(t, ring, i, plane, Hn, H, k):
+    """Write the curvatures of vertex k from the sum t of its fluxes and what `weigh` left at place i."""
+    scale = ring[i + THREE * plane]
+    h = t[0] * scale, t[1] * scale, t[2] * scale
+    if Hn is not None:
+        Hn[THREE * k], Hn[THREE * k + ONE], Hn[THREE * k + TWO] = h
+    if H is not None:
+        H[k] = -dot(h, triple(ring, i, plane))
 
 
 @helper
-def first_row(p, q, roots, part, width):
+def aligned(size):
+    """Room for doubles that begins a page of memory."""
+    room = np.empty(size + PAGE)
+    return room[-np.int64(room.ctypes.data // 8) % PAGE :]
+
+
+@inlined
+def claim(values, size, at, turn):
+    """Ask for the memory of a third of the results of the stretch from vertex `at` on, if they are wanted."""
+    if values is not None:
+        third = size * STRETCH // 3
+        begin = size * at + turn * third
+        if begin + third <= values.size:
+            for k in range(0, third, 8):
+                prefetch_to_write(values, begin + k)
+
+
+@helper
+def ask_ahead(points, first, Hn, H, normal, area, at, turn):
+    """Ask for the stretch of the points from points[first] on and for its results', one third a turn.
+
+    As the work on another stretch goes on it arrives; all of it at once would have to be waited for.
+    """
+    begin = first + turn * STRETCH
+    if begin + STRETCH <= points.size:
+        for k in range(0, STRETCH, 8):
+            prefetch(points, begin + k)
+    claim(Hn, 3, at, turn)
+    claim(H, 1, at, turn)
+    claim(normal, 3, at, turn)
+    claim(area, 1, at, turn)
+
+
+@inlined
+def load(planes, i, points, k):
+    """Put the point that begins at points[k] at place i of the planes."""
+    place(planes, i, Y, (points[k], points[k + ONE], points[k + TWO]))
+
+
+@helper
+def load_row(planes, p, points, at, width):
+    """Put a row that begins at points[at] into planes p."""
+    wide()
+    for k in range(np.uint64(0), width):
+        load(planes, p + FIRST + k, points, at + THREE * k)
+
+
+@helper
+def load_ends(planes, p, points, first, size, across, begin, end):
+    """Put what is beside columns begin..end of the row of `size` coordinates from points[first] on.
+
+    Beyond the row it follows from `across`: see `vertices`.
+    """
+    last = first + size - 3
+    for side in range(2):
+        near, far, step = (first, last, 3) if side == 0 else (last, first, -3)
+        beside = first + (3 * begin - 3 if side == 0 else 3 * end)
+        to = p + FIRST - ONE if side == 0 else p + FIRST + np.uint64(end - begin)
+        for x in range(3):
+            if first <= beside <= last:
+                value = points[beside + x]
+            elif across.size == 0:
+                value = points[far + x]
+            else:
+                value = points[near + x]
+                for k in range(across.size):
+                    value += across[k] * (points[near + x + step * k] - points[near + x])
+            planes[to + np.uint64(x) * Y] = value
+
+
+@helper
+def load_line(planes, p, points, beyond, i, size, across, begin, end):
+    """Put columns begin..end of row i of the points, or of the one beyond either end, into planes p."""
+    width = np.uint64(end - begin)
+    if 0 <= size * i < points.size:
+        load_row(planes, p, points, np.uint64(size * i + 3 * begin), width)
+        load_ends(planes, p, points, size * i, size, across, begin, end)
+    else:
+        first = 0 if i < 0 else size
+        load_row(planes, p, beyond, np.uint64(first + 3 * begin), width)
+        load_ends(planes, p, beyond, first, size, across, begin, end)
+
+
+@inlined
+def quad(planes, p, q, i):
+    """Diagonals of the quad whose first two vertices are at i in rows p and q, the others beside them."""
+    return apart(planes, q + i + ONE, planes, p + i, Y), apart(planes, p + i + ONE, planes, q + i, Y)
+
+
+@helper
+def first_row(planes, p, q, part, liu, width):
     """Begin the sums of the vertices in row q with the quads between rows p and q."""
-    u, v = quad(p, q, FIRST - ONE)
-    (gx, gy, gz), _ = half_fluxes(u, v, roots[FIRST - ONE])
+    wide()
+    u, v = quad(planes, p, q, FIRST - ONE)
+    n, before = unit(cross(u, v))
+    (gx, gy, gz), _ = fluxes(u, v, n)
     for i in range(FIRST, FIRST + width):
-        u, v = quad(p, q, i)
-        (hx, hy, hz), (fx, fy, fz) = half_fluxes(u, v, roots[i])
-        part[i] = fx - gx
-        part[i + Y] = fy - gy
-        part[i + Z] = fz - gz
-        part[i + A] = roots[i + Y] + roots[i + Y - ONE]
-        gx, gy, gz = hx, hy, hz
+        u, v = quad(planes, p, q, i)
+        n, length = unit(cross(u, v))
+        (hx, hy, hz), (fx, fy, fz) = fluxes(u, v, n)
+        place(part, i, Y, (fx - gx, fy - gy, fz - gz))
+        if liu is not None:
+            part[i + A] = length + before
+        gx, gy, gz, before = hx, hy, hz, length
 
 
 @helper
-def weigh_row(o, p, q, roots, part, weights, liu, Hn, H, normal, area, at, width):
-    """`weigh` the vertices of row p between rows o and q."""
+def first_quad(planes, p, q, work):
+    """The quad before the first one of a row."""
+    u, v = quad(planes, p, q, FIRST - ONE)
+    n, work[FIRST - ONE + LENGTH] = unit(cross(u, v))
+    place(work, FIRST - ONE, S, n)
+
+
+@helper
+def normal_row(planes, o, p, q, work, liu, H, normal, g, width):
+    """Diagonals and normals of the quads between rows p and q, normals of the rings around row p.
+
+    As all that follows of a stretch of `width` columns, from column g on.
+    """
+    wide()
     for k in range(np.uint64(0), width):
-        i = FIRST + k
-        a, b = apart(q, i, o, i, Y), apart(p, i + ONE, p, i - ONE, Y)
-        lengths = part[i + A] + (roots[i + Y] + roots[i + Y - ONE])
-        weigh(weights, i, a, b, liu, lengths, Hn, H, normal, area, at + k)
+        i, j = FIRST + g + k, FIRST + k
+        u, v = quad(planes, p, q, i)
+        place(work, j + U, S, u)
+        place(work, j + V, S, v)
+        place(work, j, S, cross(u, v))
+        a = apart(planes, q + i, planes, o + i, Y)
+        b = apart(planes, p + i + ONE, planes, p + i - ONE, Y)
+        enclose(work, j + RING, S, a, b, liu, H, normal)
 
 
 @helper
-def vertex_row(p, q, roots, weights, part, liu, Hn, H, at, width):
+def weigh_row(work, part, liu, H, normal, area, at, g, width):
+    """Give the normals of quads length one, in Liu's formula sum their lengths, and `weigh` the vertices."""
+    wide()
+    before = work[FIRST - ONE + LENGTH]
+    for k in range(np.uint64(0), width):
+        j, lengths = FIRST + k, 0.0
+        n, length = unit(triple(work, j, S))
+        place(work, j, S, n)
+        if liu is not None:
+            i, both = j + g, length + before
+            lengths = part[i + A] + both
+            part[i + A] = both
+            work[j + LENGTH] = before = length
+        weigh(work, j + RING, S, lengths, liu, H, normal, area, at + k)
+
+
+@helper
+def vertex_row(planes, p, q, work, part, Hn, H, at, g, width):
     """Finish the vertices of row p; begin those of row q.
 
     A row of quads adds to two rows of vertices. The sums of the upper one are finished and written in the
     same loop; those of the lower one wait in `part` for the next row of quads.
     """
-    u, v = quad(p, q, FIRST - ONE)
-    (gx, gy, gz), (ex, ey, ez) = half_fluxes(u, v, roots[FIRST - ONE])
+    wide()
+    u, v = quad(planes, p, q, FIRST + g - ONE)
+    (gx, gy, gz), (ex, ey, ez) = fluxes(u, v, triple(work, FIRST - ONE, S))
     for k in range(np.uint64(0), width):
-        i = FIRST + k
-        u, v = quad(p, q, i)
-        (hx, hy, hz), (fx, fy, fz) = half_fluxes(u, v, roots[i])
+        i, j = FIRST + g + k, FIRST + k
+        u, v = triple(work, j + U, S), triple(work, j + V, S)
+        (hx, hy, hz), (fx, fy, fz) = fluxes(u, v, triple(work, j, S))
         tx = part[i] + (hx - ex)
         ty = part[i + Y] + (hy - ey)
         tz = part[i + Z] + (hz - ez)
-        part[i] = fx - gx
-        part[i + Y] = fy - gy
-        part[i + Z] = fz - gz
-        if liu is not None:
-            part[i + A] = roots[i + Y] + roots[i + Y - ONE]
+        place(part, i, Y, (fx - gx, fy - gy, fz - gz))
         gx, gy, gz, ex, ey, ez = hx, hy, hz, fx, fy, fz
-        finish(tx, ty, tz, weights, i, Hn, H, at + k)
+        finish((tx, ty, tz), work, j + RING, S, Hn, H, at + k)
 
 
 @helper
-def line(points, beyond, i):
-    """Row i of the points, or the one beyond either end."""
-    if i < 0:
-        return beyond[0]
-    if i >= points.shape[0]:
-        return beyond[1]
-    return points[i]
-
-
-@helper
-def load_row(planes, row, width):
-    """Put a row into planes."""
-    for k in range(np.uint64(0), width):
-        load(planes, FIRST + k, row, k)
-
-
-@helper
-def load_ends(planes, row, beside, begin, end):
-    """Put the neighbours of columns begin and end - 1 at the ends of a row in planes."""
-    right = FIRST + np.uint64(end - begin)
-    for x in range(3):
-        plane = np.uint64(x) * Y
-        planes[FIRST - ONE + plane] = row[3 * begin - 3 + x] if begin > 0 else beside[0, x]
-        planes[right + plane] = row[3 * end + x] if 3 * end < row.size else beside[1, x]
+def carry(work, first, width):
+    """Make the last normal and length of a stretch those before the next one."""
+    for x in (np.uint64(0), S, TWO * S, LENGTH):
+        work[first + x - ONE] = work[first + x + width - ONE]
 
 
 @kernel
-def vertices(points, beyond, beside, liu, Hn, H, normal, area, start, stop):
+def vertices(points, beyond, across, liu, Hn, H, normal, area, start, stop):
     """Mean curvature normal, mean curvature, unit normal and dual area of the vertices of rows start..stop.
 
     Parameters
     ----------
-    points : (r, 3 c) float64
+    points : (3 r c,) float64
         Vertices, row by row.
-    beyond : (2, 3 c) float64
+    beyond : (6 c,) float64
         The rows before the first one and after the last one.
-    beside : (r + 2, 2, 3) float64
-        What lies before the first and after the last column, from the row before the first one on.
+    across : (k,) float64
+        How rows go on: the point before the first one is x_0 + sum of across_k (x_k - x_0), that after the
+        last one alike. Empty: rows are closed, and these are the last and the first one.
     liu : 0 or None
         None: the finite-volume scheme.
     Hn, normal : (3 r c,) float64 or None
@@ -250,174 +395,205 @@ def vertices(points, beyond, beside, liu, Hn, H, normal, area, start, stop):
     H, area : (r c,) float64 or None
     start, stop : int
     """
-    c = points.shape[1] // 3
-    planes = np.empty((4, 3 * STRIDE))
-    part, roots, weights = np.empty(4 * STRIDE), np.empty(2 * STRIDE), np.empty(4 * STRIDE)
+    # No array is made inside the loops: counting who holds it would wait for all that is being written.
+    c = beyond.size // 6
+    room = aligned(16 * STRIDE + 14 * SHORT)
+    planes, part, work = room[: 12 * STRIDE], room[12 * STRIDE : 16 * STRIDE], room[16 * STRIDE :]
     for begin in range(0, c, WIDTH):
         end = min(begin + WIDTH, c)
-        width = np.uint64(end - begin)
-        o, p, q, fresh = planes[0], planes[1], planes[2], planes[3]
-        for i, row_planes in ((start - 1, p), (start, q)):
-            row = line(points, beyond, i)
-            load_row(row_planes, row[3 * begin : 3 * end], width)
-            load_ends(row_planes, row, beside[i + 1], begin, end)
-        for i in range(start - 1, stop):  # the row of quads below the vertices of row i
-            ahead, at = min(i + 2, stop), np.uint64(i * c + begin)
-            row = line(points, beyond, ahead)
-            root_row(p, q, roots, row[3 * begin : 3 * end], fresh, width)
-            load_ends(fresh, row, beside[ahead + 1], begin, end)
-            if i < start:
-                first_row(p, q, roots, part, width)
+        o, p, q, fresh = np.uint64(0), THREE * Y, THREE * Z, THREE * A
+        load_line(planes, o, points, beyond, start - 1, 3 * c, across, begin, end)
+        load_line(planes, p, points, beyond, start, 3 * c, across, begin, end)
+        load_line(planes, q, points, beyond, start + 1, 3 * c, across, begin, end)
+        first_row(planes, o, p, part, liu, np.uint64(end - begin))
+        for i in range(start, stop):
+            ahead = min(i + 2, stop)  # the row that is loaded
+            inside = 3 * c * ahead < points.size
+            first = 3 * c * ahead if inside else 3 * c
+            first_quad(planes, p, q, work)
+            for left in range(begin, end, STRETCH):
+                right = min(left + STRETCH, end)
+                g, at, width = np.uint64(left - begin), np.uint64(i * c + left), np.uint64(right - left)
+                ask_ahead(points, first + 3 * right, Hn, H, normal, area, i * c + right, 0)
+                normal_row(planes, o, p, q, work, liu, H, normal, g, width)
+                ask_ahead(points, first + 3 * right, Hn, H, normal, area, i * c + right, 1)
+                if inside:
+                    load_row(planes, fresh + g, points, np.uint64(first + 3 * left), width)
+                else:
+                    load_row(planes, fresh + g, beyond, np.uint64(first + 3 * left), width)
+                weigh_row(work, part, liu, H, normal, area, at, g, width)
+                ask_ahead(points, first + 3 * right, Hn, H, normal, area, i * c + right, 2)
+                vertex_row(planes, p, q, work, part, Hn, H, at, g, width)
+                carry(work, FIRST, width)
+            if inside:
+                load_ends(planes, fresh, points, first, 3 * c, across, begin, end)
             else:
-                weigh_row(o, p, q, roots, part, weights, liu, Hn, H, normal, area, at, width)
-                vertex_row(p, q, roots, weights, part, liu, Hn, H, at, width)
+                load_ends(planes, fresh, beyond, first, 3 * c, across, begin, end)
             o, p, q, fresh = p, q, fresh, o
 
 
-@helper
-def across_rows(p, q, b, roots, width):
-    """`root` of the edges between primal rows p and q, along dual row b."""
-    for i in range(FIRST, FIRST + width):
-        root(roots, i, apart(q, i, p, i, Y), apart(b, i + ONE, b, i, Y))
+@inlined
+def below(planes, p, q, b, i):
+    """Diagonals of the quad of the edge between rows p and q, across dual row b."""
+    return apart(planes, q + i, planes, p + i, Y), apart(planes, b + i + ONE, planes, b + i, Y)
+
+
+@inlined
+def beside(planes, p, a, b, i):
+    """Diagonals of the quad of the edge to the right in row p, from dual row b to a."""
+    return apart(planes, p + i + ONE, planes, p + i, Y), apart(planes, a + i + ONE, planes, b + i + ONE, Y)
 
 
 @helper
-def along_row(p, a, b, roots, width):
-    """`root` of the edges between the points of primal row p, from dual row b to a."""
-    for i in range(FIRST - ONE, FIRST + width):
-        root(roots, i, apart(p, i + ONE, p, i, Y), apart(a, i + ONE, b, i + ONE, Y))
-
-
-@helper
-def first_cells(p, q, b, below, part, width):
+def first_cells(planes, p, q, b, part, width):
     """Fluxes from primal row q into row p, across dual row b."""
+    wide()
     for i in range(FIRST, FIRST + width):
-        (gx, gy, gz), _ = half_fluxes(apart(q, i, p, i, Y), apart(b, i + ONE, b, i, Y), below[i])
-        part[i] = gx
-        part[i + Y] = gy
-        part[i + Z] = gz
-        part[i + A] = below[i + Y]
+        u, v = below(planes, p, q, b, i)
+        n, part[i + A] = unit(cross(u, v))
+        flux, _ = fluxes(u, v, n)
+        place(part, i, Y, flux)
 
 
 @helper
-def weigh_cells(a, b, below, beside, part, weights, liu, Hn, H, normal, area, at, width):
-    """`weigh` the primal points between dual rows a and b."""
+def first_edge(planes, p, a, b, work):
+    """The edge to the left of the first point of row p."""
+    u, v = beside(planes, p, a, b, FIRST - ONE)
+    n, work[FIRST - ONE + EDGE + LENGTH] = unit(cross(u, v))
+    place(work, FIRST - ONE + EDGE, S, n)
+
+
+@helper
+def normal_cells(planes, p, q, a, b, work, liu, H, normal, g, width):
+    """Normals of the quads below and beside row p, and of the rings around it, of a stretch from column g."""
+    wide()
     for k in range(np.uint64(0), width):
-        i = FIRST + k
-        u, v = apart(b, i + ONE, a, i, Y), apart(a, i + ONE, b, i, Y)
-        lengths = (below[i + Y] + part[i + A]) + (beside[i + Y] + beside[i + Y - ONE])
-        weigh(weights, i, u, v, liu, lengths, Hn, H, normal, area, at + k)
+        i, j = FIRST + g + k, FIRST + k
+        u, v = below(planes, p, q, b, i)
+        place(work, j, S, cross(u, v))
+        u, v = beside(planes, p, a, b, i)
+        place(work, j + EDGE, S, cross(u, v))
+        u = apart(planes, b + i + ONE, planes, a + i, Y)
+        v = apart(planes, a + i + ONE, planes, b + i, Y)
+        enclose(work, j + RING, S, u, v, liu, H, normal)
 
 
 @helper
-def cell_row(p, q, a, b, below, beside, weights, part, liu, Hn, H, at, width):
+def weigh_cells(work, part, liu, H, normal, area, at, g, width):
+    """As `weigh_row`."""
+    wide()
+    before = work[FIRST - ONE + EDGE + LENGTH]
+    for k in range(np.uint64(0), width):
+        j, lengths = FIRST + k, 0.0
+        n, under = unit(triple(work, j, S))
+        place(work, j, S, n)
+        n, length = unit(triple(work, j + EDGE, S))
+        place(work, j + EDGE, S, n)
+        if liu is not None:
+            i = j + g
+            lengths = (under + part[i + A]) + (length + before)
+            part[i + A] = under
+            work[j + EDGE + LENGTH] = before = length
+        weigh(work, j + RING, S, lengths, liu, H, normal, area, at + k)
+
+
+@helper
+def cell_row(planes, p, q, a, b, work, part, Hn, H, at, g, width):
     """Finish the points of primal row p, between dual rows a and b; q is the next one."""
-    u, v = apart(p, FIRST, p, FIRST - ONE, Y), apart(a, FIRST, b, FIRST, Y)
-    (ex, ey, ez), _ = half_fluxes(u, v, beside[FIRST - ONE])
+    wide()
+    u, v = beside(planes, p, a, b, FIRST + g - ONE)
+    (ex, ey, ez), _ = fluxes(u, v, triple(work, FIRST - ONE + EDGE, S))
     for k in range(np.uint64(0), width):
-        i = FIRST + k
-        (gx, gy, gz), _ = half_fluxes(apart(q, i, p, i, Y), apart(b, i + ONE, b, i, Y), below[i])
-        u, v = apart(p, i + ONE, p, i, Y), apart(a, i + ONE, b, i + ONE, Y)
-        (fx, fy, fz), _ = half_fluxes(u, v, beside[i])
+        i, j = FIRST + g + k, FIRST + k
+        u, v = below(planes, p, q, b, i)
+        (gx, gy, gz), _ = fluxes(u, v, triple(work, j, S))
+        u, v = beside(planes, p, a, b, i)
+        (fx, fy, fz), _ = fluxes(u, v, triple(work, j + EDGE, S))
         tx = (gx - part[i]) + (fx - ex)
         ty = (gy - part[i + Y]) + (fy - ey)
         tz = (gz - part[i + Z]) + (fz - ez)
-        part[i] = gx
-        part[i + Y] = gy
-        part[i + Z] = gz
-        if liu is not None:
-            part[i + A] = below[i + Y]
+        place(part, i, Y, (gx, gy, gz))
         ex, ey, ez = fx, fy, fz
-        finish(tx, ty, tz, weights, i, Hn, H, at + k)
+        finish((tx, ty, tz), work, j + RING, S, Hn, H, at + k)
 
 
 @kernel
-def cells(points, beyond, beside, halo, dual, liu, Hn, H, normal, area, start, stop):
+def cells(points, beyond, across, halo, dual, liu, Hn, H, normal, area, start, stop):
     """As `vertices`, of the primal points of a staggered grid.
 
     Parameters
     ----------
-    points : (r, 3 c) float64
-        Primal points; with halo = 1 (r + 2, 3 c + 6), those beyond and beside among them.
-    beyond, beside
+    points : (3 r c,) float64
+        Primal points; with halo = 1 (3 (r + 2) (c + 2),), those around them too.
+    beyond : (6 c,) float64
+        As for `vertices`; with halo = 1 not read.
+    across
         As for `vertices`; with halo = 1 not read.
     halo : int
-    dual : (r + 1, 3 c + 3) float64
+    dual : (3 (r + 1) (c + 1),) float64
         Dual points; those of the first row and column come before the first primal ones.
     liu, Hn, H, normal, area, start, stop
         As for `vertices`.
     """
-    c = dual.shape[1] // 3 - 1
-    primal, corners = np.empty((2, 3 * STRIDE)), np.empty((2, 3 * STRIDE))
-    part, below, right = np.empty(4 * STRIDE), np.empty(2 * STRIDE), np.empty(2 * STRIDE)
-    weights = np.empty(4 * STRIDE)
+    c = beyond.size // 6
+    room = aligned(16 * STRIDE + 12 * SHORT)
+    planes, part, work = room[: 12 * STRIDE], room[12 * STRIDE : 16 * STRIDE], room[16 * STRIDE :]
     for begin in range(0, c, WIDTH):
         end = min(begin + WIDTH, c)
-        width = np.uint64(end - begin)
-        p, q, a, b = primal[0], primal[1], corners[0], corners[1]
+        p, q, a, b = np.uint64(0), THREE * Y, THREE * Z, THREE * A
         for i in range(start - 1, stop + 1):  # p and a are rows i - 1 once they are there
-            row = line(points, beyond, i + halo)
-            load_row(q, row[3 * (begin + halo) : 3 * (end + halo)], width)
-            load_ends(q, row, beside[i + 1], begin + halo, end + halo)
+            size = 3 * (c + 2 * halo)
+            load_line(planes, q, points, beyond, i + halo, size, across, begin + halo, end + halo)
             if i >= start:
-                load_row(b, dual[i, 3 * begin : 3 * end + 3], width + ONE)
-                across_rows(p, q, b, below, width)
+                at = np.uint64(3 * ((c + 1) * i + begin))
+                load_row(planes, b, dual, at, np.uint64(end - begin + 1))
             if i == start:
-                first_cells(p, q, b, below, part, width)
+                first_cells(planes, p, q, b, part, np.uint64(end - begin))
             elif i > start:
-                at = np.uint64((i - 1) * c + begin)
-                along_row(p, a, b, right, width)
-                weigh_cells(a, b, below, right, part, weights, liu, Hn, H, normal, area, at, width)
-                cell_row(p, q, a, b, below, right, weights, part, liu, Hn, H, at, width)
+                first_edge(planes, p, a, b, work)
+                for left in range(begin, end, STRETCH):
+                    right = min(left + STRETCH, end)
+                    g, width = np.uint64(left - begin), np.uint64(right - left)
+                    at = np.uint64((i - 1) * c + left)
+                    normal_cells(planes, p, q, a, b, work, liu, H, normal, g, width)
+                    weigh_cells(work, part, liu, H, normal, area, at, g, width)
+                    cell_row(planes, p, q, a, b, work, part, Hn, H, at, g, width)
+                    carry(work, FIRST + EDGE, width)
             p, q, a, b = q, p, b, a
 
 
-@inlined
-def two_corners(x, k, a, d, b, e, c):
-    """Half fluxes into vertex k from its corners (a, d, b) and (b, e, c), and |n| of both: one division."""
-    u, v, w, z = (
-        apart(x, d + k, x, k, SIDE),
-        apart(x, b + k, x, a + k, SIDE),
-        apart(x, e + k, x, k, SIDE),
-        apart(x, c + k, x, b + k, SIDE),
-    )
-    m, n = cross(u, v), cross(w, z)
-    p, q = norm(m), norm(n)
-    f, g = cross(v, m), cross(z, n)
-    scale = quotient(0.5, p * q)
-    s, t = q * scale, p * scale
-    return s * f[0] + t * g[0], s * f[1] + t * g[1], s * f[2] + t * g[2], p + q
+@helper
+def corner_normals(x, a, d, b, normals, size):
+    """Normals (d - c) x (b - a) of one corner of every vertex c of a block."""
+    wide()
+    for k in range(np.uint64(0), size):
+        place(normals, k, CORNERS, cross(apart(x, d + k, x, k, SIDE), apart(x, b + k, x, a + k, SIDE)))
 
 
 @helper
-def block(x, size, sums, weights, at, liu, Hn, H, normal, area):
+def block(x, size, normals, ring, at, liu, Hn, H, normal, area):
     """Finish the vertices of a block from the planes x of their nine points."""
-    a0, d0, a1, d1 = np.uint64(1) * POINT, np.uint64(2) * POINT, np.uint64(3) * POINT, np.uint64(4) * POINT
-    a2, d2, a3, d3 = np.uint64(5) * POINT, np.uint64(6) * POINT, np.uint64(7) * POINT, np.uint64(8) * POINT
+    wide()
+    a, d, b, e = POINT, THREE * POINT, np.uint64(5) * POINT, np.uint64(7) * POINT  # along the edges
+    for j, first, last in ((0, a, d), (1, d, b), (2, b, e), (3, e, a)):
+        corner_normals(x, first, first + POINT, last, normals[BLOCK * j :], size)
+    for k in range(np.uint64(0), CORNERS):
+        n, normals[k + THREE * CORNERS] = unit(triple(normals, k, CORNERS))
+        place(normals, k, CORNERS, n)
     for k in range(np.uint64(0), size):
-        sums[k], sums[k + Y], sums[k + Z], sums[k + A] = two_corners(x, k, a0, d0, a1, d1, a2)
+        u, v = apart(x, b + k, x, a + k, SIDE), apart(x, e + k, x, d + k, SIDE)
+        enclose(ring, k, SIDE, u, v, liu, H, normal)
     for k in range(np.uint64(0), size):
-        tx, ty, tz, lengths = two_corners(x, k, a2, d2, a3, d3, a0)
-        sums[k] += tx
-        sums[k + Y] += ty
-        sums[k + Z] += tz
-        sums[k + A] += lengths
+        i = k + THREE * CORNERS
+        lengths = (normals[i] + normals[i + SIDE]) + (normals[i + TWICE] + normals[i + POINT])
+        weigh(ring, k, SIDE, lengths, liu, H, normal, area, at + k)
     for k in range(np.uint64(0), size):
-        weigh(
-            weights,
-            k,
-            apart(x, a2 + k, x, a0 + k, SIDE),
-            apart(x, a3 + k, x, a1 + k, SIDE),
-            liu,
-            sums[k + A],
-            Hn,
-            H,
-            normal,
-            area,
-            at + k,
-        )
-    for k in range(np.uint64(0), size):
-        finish(sums[k], sums[k + Y], sums[k + Z], weights, k, Hn, H, at + k)
+        f = fused_cross(apart(x, d + k, x, a + k, SIDE), triple(normals, k, CORNERS))
+        g = fused_cross(apart(x, b + k, x, d + k, SIDE), triple(normals, k + SIDE, CORNERS))
+        h = fused_cross(apart(x, e + k, x, b + k, SIDE), triple(normals, k + TWICE, CORNERS))
+        t = fused_cross(apart(x, a + k, x, e + k, SIDE), triple(normals, k + POINT, CORNERS))
+        t = (f[0] + g[0]) + (h[0] + t[0]), (f[1] + g[1]) + (h[1] + t[1]), (f[2] + g[2]) + (h[2] + t[2])
+        finish(t, ring, k, SIDE, Hn, H, at + k)
 
 
 @inlined
@@ -430,24 +606,8 @@ def gather_ring(points, ring, v, x, k):
         x[at], x[at + SIDE], x[at + TWICE] = points[i], points[i + ONE], points[i + TWO]
 
 
-@helper
-def own(values, width):
-    """Room for the results of a block, where they are wanted."""
-    return None if values is None else np.empty(width * BLOCK)
-
-
-@helper
-def put(block, order, begin, end, width, values):
-    """Write the results of vertices order[begin:end], where they are wanted, to their places."""
-    if values is not None:
-        for k in range(end - begin):
-            i, at = np.uint64(width * order[begin + k]), np.uint64(width * k)
-            for x in range(np.uint64(0), np.uint64(width)):
-                values[i + x] = block[at + x]
-
-
 @kernel
-def rings(points, ring, order, far, liu, Hn, H, normal, area, start, stop):
+def rings(points, ring, far, liu, Hn, H, normal, area, start, stop):
     """As `vertices`, of the regular vertices start..stop of a face list.
 
     Parameters
@@ -456,16 +616,12 @@ def rings(points, ring, order, far, liu, Hn, H, normal, area, start, stop):
     ring : (n, 8) int32
         The ring (a, d, a, d, ...) of each vertex, counter-clockwise; negative first where the vertex is not
         regular, whose results are NaN.
-    order : (n,) int32 or None
-        Place in the results of each vertex; None: its own.
     far : bool
         Whether neighbours are far apart in `points`.
     liu, Hn, H, normal, area, start, stop
         As for `vertices`.
     """
-    x, sums, weights = np.empty(9 * 3 * BLOCK), np.empty(4 * STRIDE), np.empty(4 * STRIDE)
-    if order is not None:
-        b_Hn, b_H, b_normal, b_area = own(Hn, 3), own(H, 1), own(normal, 3), own(area, 1)
+    x, normals, weights = np.empty(9 * 3 * BLOCK), np.ones(16 * BLOCK), np.empty(4 * BLOCK)
     for begin in range(start, stop, BLOCK):
         end = min(begin + BLOCK, stop)
         size = np.uint64(end - begin)
@@ -475,26 +631,22 @@ def rings(points, ring, order, far, liu, Hn, H, normal, area, start, stop):
                 for j in range(8):
                     prefetch(points, 3 * ring[ahead, j])
             gather_ring(points, ring, begin + k, x, np.uint64(k))
-        if order is None:
-            block(x, size, sums, weights, np.uint64(begin), liu, Hn, H, normal, area)
-        else:
-            block(x, size, sums, weights, np.uint64(0), liu, b_Hn, b_H, b_normal, b_area)
-            put(b_Hn, order, begin, end, 3, Hn)
-            put(b_H, order, begin, end, 1, H)
-            put(b_normal, order, begin, end, 3, normal)
-            put(b_area, order, begin, end, 1, area)
+        block(x, size, normals, weights, np.uint64(begin), liu, Hn, H, normal, area)
 
 
 @inlined
 def conductance(u, v):
     """K_00 and K_01 of a quad: K (u, v) are the half fluxes into its first two vertices."""
-    scale = quotient(0.5, norm(cross(u, v)))
+    n = cross(u, v)
+    square = dot(n, n)
+    scale = 0.5 * unless_zero(reciprocal_root(square), square)
     return scale * dot(v, v), -scale * dot(u, v)
 
 
 @helper
 def corner_weights(x, a, d, b, own, mixed, size):
     """Planes of `conductance` of the corner (a, d, b) of each vertex of a block."""
+    wide()
     for k in range(np.uint64(0), size):
         own[k], mixed[k] = conductance(apart(x, d + k, x, k, SIDE), apart(x, b + k, x, a + k, SIDE))
 
@@ -564,11 +716,14 @@ def ring_stiffness(points, ring, indptr, indices, data, start, stop):
 
 
 @kernel
-def gather(points, order, ordered, start, stop):
-    """Points (3 n,) in another order: the k-th is points order[k], for start <= k < stop."""
-    for k in range(start, stop):
-        i, at = THREE * np.uint64(order[k]), THREE * np.uint64(k)
-        ordered[at], ordered[at + ONE], ordered[at + TWO] = points[i], points[i + ONE], points[i + TWO]
+def gather(values, order, ordered, start, stop):
+    """Triples (3 n,) or numbers (n,) in another order: the k-th is number order[k], for start <= k < stop."""
+    if values.size == order.size:
+        for k in range(np.uint64(start), np.uint64(stop)):
+            ordered[k] = values[np.uint64(order[k])]
+    else:
+        for k in range(np.uint64(start), np.uint64(stop)):
+            place(ordered, THREE * k, ONE, triple(values, THREE * np.uint64(order[k]), ONE))
 
 
 @inlined

@@ -243,7 +243,7 @@ def nearby_order(ring):
 
 @kernel
 def renumbered(ring, order):
-    """Rings in another order, their vertices numbered by place in it."""
+    """Rings in another order, their vertices numbered by place in it; and the places."""
     place = np.empty(order.size, np.int32)
     for k in range(order.size):
         place[order[k]] = k
@@ -254,7 +254,7 @@ def renumbered(ring, order):
         if ring[v, 0] >= 0:
             for j in range(8):
                 moved[k, j] = place[ring[v, j]]
-    return moved
+    return moved, place
 
 
 @helper

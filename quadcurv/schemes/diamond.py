@@ -103,7 +103,7 @@ def write(mesh: Mesh, frame: Frame | None, results: dict[str, Floats], *, liu: i
     assert frame is not None
     r, c = mesh.shape
     if isinstance(mesh, QuadGrid):
-        kernel = partial(diamond.vertices, mesh.points.reshape(r, -1), *frame, liu, *wanted)
+        kernel = partial(diamond.vertices, mesh.points.ravel(), *frame, liu, *wanted)
     else:
         dual = mesh.dual
         for axis in (0, 1):
@@ -111,9 +111,8 @@ def write(mesh: Mesh, frame: Frame | None, results: dict[str, Floats], *, liu: i
             if mesh.wrap[axis] and not np.array_equal(first, last):  # the seam is that of the first
                 dual = dual.copy()
                 np.moveaxis(dual, axis, 0)[-1] = first
-        points = mesh.primal.reshape(len(mesh.primal), -1)
-        halo = int(mesh.has_ghosts)
-        kernel = partial(diamond.cells, points, *frame, halo, dual.reshape(r + 1, -1), liu, *wanted)
+        points, halo = mesh.primal.ravel(), int(mesh.has_ghosts)
+        kernel = partial(diamond.cells, points, *frame, halo, dual.ravel(), liu, *wanted)
     parallel.over(kernel, r, r * c, diamond.LEAST_ROWS)
 
 
@@ -123,9 +122,16 @@ def _write_rings(mesh: QuadMesh, liu: int | None, wanted: list[Floats | None]) -
 
     n = len(mesh.points)
     order, ring = mesh.ring_order()
-    points, far = mesh.points.ravel(), order is None and mesh.distance > topology.FAR
+    points, found = mesh.points.ravel(), wanted
     if order is not None:
+        there, back = order
         points = np.empty(3 * n)
-        parallel.over(partial(diamond.gather, mesh.points.ravel(), order, points), n, n)
-    kernel = partial(diamond.rings, points, ring, order, far, liu, *wanted)
-    parallel.over(kernel, n, _RING_WORK * n, diamond.BLOCK)
+        parallel.over(partial(diamond.gather, mesh.points.ravel(), there, points), n, n)
+        found = [None if values is None else np.empty_like(values) for values in wanted]
+    far = order is None and mesh.distance > topology.FAR
+    parallel.over(partial(diamond.rings, points, ring, far, liu, *found), n, _RING_WORK * n, diamond.BLOCK)
+    if order is not None:
+        # Reads from everywhere overlap, writes to everywhere wait: hence not straight to their places.
+        for values, ordered in zip(wanted, found, strict=True):
+            if values is not None:
+                parallel.over(partial(diamond.gather, ordered, back, values), n, n)
