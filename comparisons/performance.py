@@ -106,8 +106,9 @@ def numpy_finite_volume(points: Floats) -> Floats:
 def interpreted(module: ModuleType, **instead: Any) -> dict[str, Any]:
     """What is in a module of kernels, these as plain Python that calls plain Python; some names replaced."""
     kernels = {name: f.py_func for name, f in vars(module).items() if hasattr(f, "py_func")}
-    names = {**vars(module), **instead}
+    names = dict(vars(module))
     names.update({name: FunctionType(f.__code__, names) for name, f in kernels.items()})
+    names.update(instead)
     return names
 
 
@@ -116,15 +117,20 @@ def short(name: str) -> str:
     return name.replace("finite_volume", "FV").replace("liu", "Liu")
 
 
-def operations() -> dict[str, int]:
+def operations(newton: bool = False) -> dict[str, int]:
     """Floating-point operations a vertex of H n on a grid, counted while the kernels' own code runs.
+
+    Parameters
+    ----------
+    newton : bool
+        Count what a reciprocal root is made of; else it is a root and a quotient, as in the thesis.
 
     Returns
     -------
     dict
-        "differences": 2 x 3 for the diagonals of the quad, twice, and as many for those of the ring. "root",
-        "fluxes": of one quad, whose four fluxes are two and their opposites. "sums": 3 x 3 of fluxes into
-        vertices. "area", "scaling": of one vertex. "all": the total.
+        "differences": 2 x 3 for the diagonals of the quad, and as many for those of the ring. "normal": of
+        unit length. "fluxes": of one quad, whose four fluxes are two and their opposites. "sums": 3 x 3 of
+        fluxes into vertices. "area", "scaling": of one vertex. "all": the total.
     """
     count = 0
 
@@ -143,12 +149,12 @@ def operations() -> dict[str, int]:
         for kind in ("__{}__", "__r{}__"):
             setattr(Counted, kind.format(name), counting(kind.format(name)))
 
-    def root(x: float) -> Counted:
-        nonlocal count
-        count += 1
-        return Counted(np.sqrt(x))
-
-    names = interpreted(diamond, sqrt=root)
+    names = interpreted(
+        diamond,
+        guess=lambda x: Counted(float(x) ** -0.5),  # no floating-point operation
+        muladd=lambda a, b, c: a * b + c,
+        **({} if newton else {"reciprocal_root": lambda x: 1 / (x * 1)}),  # counts as two
+    )
 
     def run(name: str, *given: Any) -> int:
         nonlocal count
@@ -157,16 +163,16 @@ def operations() -> dict[str, int]:
         return count
 
     u, v = (tuple(map(Counted, x)) for x in ((1.0, 0.2, 0.3), (-0.1, 1.1, 0.4)))
-    place = np.empty(4 * diamond.STRIDE, object)
-    place[0] = u[0]
+    planes = np.empty(4, object)
     parts = {
-        "differences": 18,
-        "root": run("norm", names["cross"](u, v)) + run("cross", u, v) + run("quotient", 0.5, u[0]),
-        "fluxes": run("half_fluxes", u, v, u[0]),
+        "differences": 12,
+        "normal": run("cross", u, v) + run("dot", u, u) + run("reciprocal_root", u[0]) + 3,
+        "fluxes": run("fluxes", u, v, u),
         "sums": 9,
         # Of H n alone; Liu's sum of areas is not asked for.
-        "area": run("weigh", place, 0, u, v, None, 0.0, place, None, None, None, 0),
-        "scaling": run("finish", *u, place, 0, np.empty(3), None, 0),
+        "area": run("enclose", planes, 0, 1, u, v, None, None, None)
+        + run("weigh", planes, 0, 1, 0.0, None, None, None, None, 0),
+        "scaling": run("finish", u, planes, 0, 1, np.empty(3), None, 0),
     }
     return {**parts, "all": sum(parts.values())}
 
@@ -174,14 +180,18 @@ def operations() -> dict[str, int]:
 def rounds(jobs: Mapping[Key, Job], count: int, loop: float = 0) -> dict[Key, Floats]:
     """Wall time of each job in each round; all run once beforehand.
 
-    A job runs until `loop` seconds have passed, and its last call counts: threads are slow to wake after a
-    pause, of which calls repeated in a loop see nothing. With 0 it is one call, from memory.
+    Every round has an order of its own: what a job leaves in the caches, and whether it leaves other
+    threads awake, is then not always for the same one. A job runs until `loop` seconds have passed, and its
+    last call counts: threads are slow to wake after a pause, of which calls repeated in a loop see nothing.
+    With 0 it is one call.
     """
     for job in jobs.values():
         job()
     times = np.empty((len(jobs), count))
+    calls, rng = list(jobs.values()), np.random.default_rng(0)
     for k in range(count):
-        for i, job in enumerate(jobs.values()):
+        for i in rng.permutation(len(calls)):
+            job = calls[i]
             first = time.perf_counter()
             while True:
                 begin = time.perf_counter()
@@ -310,6 +320,8 @@ def face_jobs(n: int) -> tuple[Jobs, Jobs]:
     ours["stiffness in place"] = lambda: qc.stiffness_matrix(mesh, out=S)
     local = np.ones(16 * len(faces))
     i, j = np.repeat(faces, 4, axis=1).ravel(), np.tile(faces, (1, 4)).ravel()
+    order, target = np.random.default_rng(1).permutation(len(points)), np.empty_like(points)
+    peers["numpy.take, shuffled"] = partial(np.take, points, order, 0, target, "clip")
     peers["scipy coo->csr"] = lambda: scipy.sparse.csr_array((local, (i, j)), shape=S.shape)
     if len(points) <= 2**20:
         peers["scipy assembly"] = lambda: quad_stiffness(stencils)
@@ -499,15 +511,20 @@ def markdown(
         "Validation is never left out: *one call* checks the mesh, sorts its corners and evaluates;",
         "*repeated* moves the points of a mesh (`mesh.with_points(points)`, which checks them) and",
         "evaluates. A *copy* reads and writes the 24 + 24 bytes a vertex that the mean curvature normal",
-        "reads and writes, on as many threads. Grids and copies are called once a round, and find their",
-        "data in memory. Face lists and their peers are called again until 0.1 s have passed, and the last",
-        "call counts. *First call* is a fresh process, until its result is there.",
+        "reads and writes, on as many threads. Every round has an order of its own. Grids and copies are",
+        "called once a round: what they read and write was last used by another of them, and of 65 536",
+        "and a million vertices may still be in the last cache. Face lists and their peers are called",
+        "again until 0.1 s have passed, and the last call counts. *numpy.take* does nothing but bring",
+        "points into a random order: so memory's own cost grows there. *First call* is a fresh process,",
+        "until its result is there.",
         "",
         f"Python {platform.python_version()}, {os.cpu_count()} cores, {versions()}.",
         "",
         f"Floating-point operations a vertex: {counted['all']} "
         f"({', '.join(f'{n} {name}' for name, n in counted.items() if name != 'all')}); "
-        f"the thesis's implementation took {THESIS_OPERATIONS}.",
+        f"the thesis's implementation took {THESIS_OPERATIONS}. "
+        f"A reciprocal root counts as two; made of products and sums as it is, the total is "
+        f"{operations(newton=True)['all']}.",
     ]
     if peak:
         per = ", ".join(f"{who} {b:.0f}" for who, b in peak.items())
