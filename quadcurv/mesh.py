@@ -412,14 +412,16 @@ class QuadMesh:
         from quadcurv.kernels import topology
 
         shared = self._shared
-        if "order" not in shared and shared.setdefault("uses", 0) > 0:
-            shared["order"] = None
+        given: tuple[tuple[Ints, Ints] | None, Ints] = None, self._ring
+        if "rings" not in shared and shared.setdefault("uses", 0) > 0:
+            found = given
             if self.distance > _FAR:
                 order = topology.nearby_order(self._ring)
-                shared["ring"], place = topology.renumbered(self._ring, order)
-                shared["order"] = order, place
+                ring, place = topology.renumbered(self._ring, order)
+                found = (order, place), ring
+            shared["rings"] = found  # at once: other threads see both or neither
         shared["uses"] = 1
-        return shared.get("order"), shared.get("ring", self._ring)
+        return shared.get("rings", given)
 
     def others(self) -> tuple[NDArray[np.int64], Stencils]:
         """Vertices that are not regular or not inside, and the stencils of a part of the mesh around them.
