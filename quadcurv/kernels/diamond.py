@@ -69,6 +69,12 @@ def apart(x, i, y, j, plane):
 
 
 @inlined
+def times(a, scale):
+    """A triple times a number."""
+    return a[0] * scale, a[1] * scale, a[2] * scale
+
+
+@inlined
 def cross(a, b):
     """Cross product of two triples, zero where they are equal: its products are rounded alike."""
     return (
@@ -139,7 +145,7 @@ def unit(n):
     square = dot(n, n)
     scale = reciprocal_root(square)
     length, scale = square * scale, unless_zero(scale, square)
-    return (n[0] * scale, n[1] * scale, n[2] * scale), length
+    return times(n, scale), length
 
 
 @inlined
@@ -173,11 +179,10 @@ def weigh(ring, i, plane, lengths, liu, H, normal, area, k):
             area[k] = 0.25 * square * scale
         scale = unless_zero(scale, square)
         if H is not None or normal is not None:
-            n = triple(ring, i, plane)
-            n = n[0] * scale, n[1] * scale, n[2] * scale
+            n = times(triple(ring, i, plane), scale)
             place(ring, i, plane, n)
         if normal is not None:
-            normal[THREE * k], normal[THREE * k + ONE], normal[THREE * k + TWO] = n
+            place(normal, THREE * k, ONE, n)
     if liu is not None:
         scale = quotient(2, lengths)
         if area is not None:
@@ -189,9 +194,9 @@ def weigh(ring, i, plane, lengths, liu, H, normal, area, k):
 def finish(t, ring, i, plane, Hn, H, k):
     """Write the curvatures of vertex k from the sum t of its fluxes and what `weigh` left at place i."""
     scale = ring[i + THREE * plane]
-    h = t[0] * scale, t[1] * scale, t[2] * scale
+    h = times(t, scale)
     if Hn is not None:
-        Hn[THREE * k], Hn[THREE * k + ONE], Hn[THREE * k + TWO] = h
+        place(Hn, THREE * k, ONE, h)
     if H is not None:
         H[k] = -dot(h, triple(ring, i, plane))
 
@@ -230,18 +235,12 @@ def ask_ahead(points, first, Hn, H, normal, area, at, turn):
     claim(area, 1, at, turn)
 
 
-@inlined
-def load(planes, i, points, k):
-    """Put the point that begins at points[k] at place i of the planes."""
-    place(planes, i, Y, (points[k], points[k + ONE], points[k + TWO]))
-
-
 @helper
 def load_row(planes, p, points, at, width):
     """Put a row that begins at points[at] into planes p."""
     wide()
     for k in range(np.uint64(0), width):
-        load(planes, p + FIRST + k, points, at + THREE * k)
+        place(planes, p + FIRST + k, Y, triple(points, at + THREE * k, ONE))
 
 
 @helper
@@ -602,8 +601,7 @@ def gather_ring(points, ring, v, x, k):
     regular = ring[v, 0] >= 0
     for j in range(9):
         i = THREE * np.uint64(ring[v, j - 1] if regular and j > 0 else v)
-        at = np.uint64(j) * POINT + k
-        x[at], x[at + SIDE], x[at + TWICE] = points[i], points[i + ONE], points[i + TWO]
+        place(x, np.uint64(j) * POINT + k, SIDE, triple(points, i, ONE))
 
 
 @kernel
