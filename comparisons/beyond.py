@@ -23,11 +23,10 @@ from comparisons.common import (
 )
 from quadcurv import QuadGrid, QuadMesh, mean_curvature
 from quadcurv.boundary import ghost_layer
-from quadcurv.compare import convergence
-from quadcurv.mesh import Stencils, grid_faces
-from quadcurv.rates import fitted_rate
+from quadcurv.convergence import convergence, fitted_rate
 from quadcurv.schemes import cotan
 from quadcurv.schemes.finite_volume import FINITE_VOLUME
+from quadcurv.stencils import Stencils, grid_faces
 from quadcurv.surfaces import (
     Surface,
     catenoid,

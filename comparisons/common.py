@@ -18,11 +18,11 @@ from numpy.typing import ArrayLike, NDArray
 from rich.console import Console
 from rich.table import Table
 
-from quadcurv import view
-from quadcurv.compare import Comparison
+from quadcurv.comparison import Comparison
+from quadcurv.convergence import fitted_rate
 from quadcurv.curvature import dual_areas
 from quadcurv.mesh import Mesh, QuadGrid, StaggeredGrid
-from quadcurv.rates import fitted_rate
+from quadcurv.viewing import window
 
 # Okabe and Ito (2008): told apart with every kind of colour blindness.
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
@@ -182,7 +182,7 @@ def convergence_plot(
         if zero.any():
             axes.plot(n[zero], np.full(zero.sum(), floor), linestyle="none", fillstyle="none", **style)
             axes.set_ylim(bottom=floor)
-    for k, edge in enumerate(sorted({size for window in fit.values() for size in window})):
+    for k, edge in enumerate(sorted({size for span in fit.values() for size in span})):
         axes.axvline(
             edge, color="0.4", linestyle="--", linewidth=0.9, label=None if k else "range of the fit"
         )
@@ -248,10 +248,10 @@ def save_maps(
     ]
     header = ("panel", "x", "y", "z", "value")
     write_csv(output, stem, dict(zip(header, zip(*table, strict=True), strict=True)))
-    problem = view.opengl_problem()
+    problem = window.opengl_problem()
     if problem:
         for i, (title, (mesh, values)) in enumerate(panels.items(), 1):
-            view.save_maps(_as_error(mesh, title, values), output / f"{stem}_{i}.html")
+            window.save_maps(_as_error(mesh, title, values), output / f"{stem}_{i}.html")
         return problem
     images = {title: _picture(*panel, decades, camera) for title, panel in panels.items()}
     widths = [image.shape[1] / image.shape[0] for image in images.values()]

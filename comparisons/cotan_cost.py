@@ -14,10 +14,10 @@ from rich.console import Console
 from rich.table import Table
 
 from quadcurv import QuadMesh, mean_curvature
-from quadcurv.compare import progress
 from quadcurv.schemes import SCHEMES, as_scheme
 from quadcurv.schemes.cotan import cotan_matrices
 from quadcurv.surfaces import torus
+from quadcurv.tables import progress
 
 PLAIN = "plain igl.cotmatrix + massmatrix"
 CASES = (PLAIN, *(name for name in SCHEMES if name.startswith("cotan")))

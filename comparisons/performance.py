@@ -26,7 +26,7 @@ from numpy.typing import NDArray
 
 import quadcurv as qc
 from comparisons.common import COLOURS, MARKERS, arguments, figure, paper_style, save_figure
-from quadcurv.kernels import diamond, parallel
+from quadcurv.kernels import diamond, ranges
 from quadcurv.schemes.diamond import quad_stiffness
 
 Floats = NDArray[np.float64]
@@ -218,7 +218,7 @@ def grid_jobs(n: int) -> tuple[Jobs, Jobs]:
     target = out["mean_curvature_normal"]
 
     def copy() -> None:
-        parallel.over(lambda i, j: np.copyto(target[i:j], points[i:j]), n, n * n)
+        ranges.over(lambda i, j: np.copyto(target[i:j], points[i:j]), n, n * n)
 
     ours: Jobs = {"copy": copy}
     for scheme in ("finite_volume", "liu"):
@@ -430,7 +430,7 @@ def memory(n: int) -> tuple[Ratio, dict[str, float]]:
     peak = {who: float(python(MEMORY, who, n)) for who in ("finite_volume", "libigl")}
     share = peak["finite_volume"] / peak["libigl"]
     name = "peak memory, one call"
-    return Ratio(name, "libigl", n * n, parallel.threads(), share, share, share, 1 / 10, 1 / 15), peak
+    return Ratio(name, "libigl", n * n, ranges.threads(), share, share, share, 1 / 10, 1 / 15), peak
 
 
 def first_call(count: int) -> Ratio:

@@ -5,8 +5,8 @@ from pathlib import Path
 from PIL import Image
 
 from quadcurv import surfaces
-from quadcurv.compare import Comparison, compare
-from quadcurv.view import save_maps
+from quadcurv.comparison import Comparison, compare
+from quadcurv.viewing.window import save_maps
 
 
 def pillow(cells: int = 40) -> Comparison:

@@ -1,7 +1,6 @@
 """Mean curvature on quad meshes and logically Cartesian grids, with every operator side by side."""
 
 from quadcurv.boundary import boundary_treatment, stencils
-from quadcurv.convert import as_grid, duplicate_points, merge_points, pair_triangles
 from quadcurv.curvature import (
     dual_areas,
     evaluate,
@@ -13,10 +12,13 @@ from quadcurv.curvature import (
     stiffness_matrix,
     vertex_normals,
 )
-from quadcurv.interop import as_mesh, attach, read, write
-from quadcurv.kernels.parallel import set_threads
-from quadcurv.mesh import CornerTable, MeshError, QuadGrid, QuadMesh, Recovery, StaggeredGrid, Stencils
+from quadcurv.io import as_mesh, attach, read, to_pymeshlab, to_pyvista, to_trimesh, write
+from quadcurv.kernels.ranges import set_threads
+from quadcurv.mesh import QuadGrid, QuadMesh, Recovery, StaggeredGrid
+from quadcurv.repair import as_grid, duplicate_points, merge_points, pair_triangles
 from quadcurv.schemes import SCHEMES, Curvatures, Fit, Scheme
+from quadcurv.stencils import CornerTable, Stencils
+from quadcurv.types import MeshError
 
 __all__ = [
     "SCHEMES",
@@ -48,7 +50,10 @@ __all__ = [
     "set_threads",
     "stencils",
     "stiffness_matrix",
+    "to_pymeshlab",
+    "to_pyvista",
+    "to_trimesh",
     "vertex_normals",
     "write",
 ]
-__version__ = "0.1.0"
+__version__ = "0.2.0"

@@ -9,19 +9,9 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-from quadcurv.mesh import (
-    Bools,
-    Floats,
-    Frame,
-    Mesh,
-    MeshError,
-    QuadGrid,
-    QuadMesh,
-    StaggeredGrid,
-    Stencils,
-    face_pairs,
-    grid_faces,
-)
+from quadcurv.mesh import Mesh, QuadGrid, QuadMesh, StaggeredGrid
+from quadcurv.stencils import Frame, Stencils, face_pairs, grid_faces
+from quadcurv.types import Bools, Floats, MeshError
 
 Indices = NDArray[np.int64]
 

@@ -17,11 +17,11 @@ from numpy.typing import ArrayLike
 from rich.console import Console
 
 import quadcurv
-from quadcurv.compare import Comparison
-from quadcurv.fields import FIELDS
-from quadcurv.interop import write
+from quadcurv.comparison import Comparison
+from quadcurv.io import write
 from quadcurv.mesh import Mesh
 from quadcurv.schemes import SCHEMES
+from quadcurv.viewing.fields import FIELDS
 
 _COMPARISONS = Path(__file__).resolve().parents[1] / "comparisons"
 
@@ -165,7 +165,7 @@ def view(
     png
         Write a picture of the same views.
     """
-    from quadcurv import view as viewing
+    from quadcurv.viewing import window as viewing
 
     refined = _refinements(mesh, scheme)
     comparison = refined(viewing.View.START) if refined else _comparison(mesh, scheme)
@@ -228,7 +228,7 @@ def reproduce(
 
 def main(arguments: Iterable[str] | None = None) -> None:
     """Run the command line; what is wrong with the input takes one line and exit code 2."""
-    from quadcurv.view import NoOpenGLError
+    from quadcurv.viewing.window import NoOpenGLError
 
     with warnings.catch_warnings():
         warnings.simplefilter("default", UserWarning)
@@ -267,14 +267,14 @@ def _counts(mesh: Mesh) -> str:
 
 
 def _comparison(mesh: str | Path, scheme: list[str] | None) -> Comparison:
-    from quadcurv.compare import compare
+    from quadcurv.comparison import compare
 
     return compare(quadcurv.read(mesh), scheme)
 
 
 def _refinements(name: str, scheme: list[str] | None) -> Callable[[int], Comparison] | None:
     """Comparisons on the surface of that name, None if it is a file's."""
-    from quadcurv.compare import compare
+    from quadcurv.comparison import compare
     from quadcurv.surfaces import SURFACES
 
     if name not in SURFACES:
@@ -311,7 +311,7 @@ def _write_csv(path: Path, mesh: Mesh, data: Mapping[str, ArrayLike]) -> None:
 
 
 def _save_pictures(comparison: Comparison, folder: Path, stem: str) -> None:
-    from quadcurv.view import opengl_problem, save_maps
+    from quadcurv.viewing.window import opengl_problem, save_maps
 
     folder.mkdir(parents=True, exist_ok=True)
     problem = opengl_problem()

@@ -10,11 +10,13 @@ import scipy
 
 from quadcurv.boundary import BOUNDARIES, frame, ghosts, with_ghosts
 from quadcurv.boundary import stencils as with_boundary
-from quadcurv.interop import as_mesh
-from quadcurv.mesh import Floats, QuadGrid, QuadMesh, StaggeredGrid, Stencils
+from quadcurv.io import as_mesh
+from quadcurv.mesh import QuadGrid, QuadMesh, StaggeredGrid
 from quadcurv.schemes import Curvatures, Fit, Scheme, as_scheme
 from quadcurv.schemes.angle_defect import angle_defect
 from quadcurv.schemes.diamond import without_infinity
+from quadcurv.stencils import Stencils
+from quadcurv.types import Floats
 
 
 def mean_curvature(

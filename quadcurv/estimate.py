@@ -7,9 +7,10 @@ from typing import Any
 import numpy as np
 
 from quadcurv.curvature import mean_curvature
-from quadcurv.interop import as_mesh
-from quadcurv.mesh import Floats, QuadGrid
+from quadcurv.io import as_mesh
+from quadcurv.mesh import QuadGrid
 from quadcurv.schemes import Fit, Scheme, as_scheme
+from quadcurv.types import Floats
 
 
 def disagreement(

@@ -1,28 +1,19 @@
-"""Meshes, checked once and frozen, and the one-ring stencils that every scheme reads."""
+"""Meshes, checked once and frozen."""
 
 from __future__ import annotations
 
-import operator
 import warnings
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
-from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
-import scipy
 from numpy.typing import ArrayLike, NDArray
 
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int32]
-Bools = NDArray[np.bool_]
+from quadcurv.checks import checked_faces, checked_points, checked_wrap, consistent_sides
+from quadcurv.stencils import Stencils, grid_faces
+from quadcurv.types import Floats, Ints, MeshError
 
-_LARGEST = 1e70
 _FAR = 100_000  # vertices between neighbours in memory, on average, from which on reordering pays
-
-
-class MeshError(ValueError):
-    """What is wrong with a mesh: which argument, where first (face or vertex), and how often."""
 
 
 class Recovery(NamedTuple):
@@ -31,150 +22,13 @@ class Recovery(NamedTuple):
     Attributes
     ----------
     rule : {"given", "carrier", "ply", "block", "interleaved", "diagonal", "shape", "none"}
-        See :meth:`QuadMesh.from_trimesh` and :func:`quadcurv.pair_triangles` ("shape").
+        See :func:`quadcurv.as_mesh` and :func:`quadcurv.pair_triangles` ("shape").
     paired : float
         Fraction of the triangles that went into quads.
     """
 
     rule: str
     paired: float
-
-
-class CornerTable(NamedTuple):
-    """One-ring stencils: the corners (c, a, d, b) around every vertex, in CSR form.
-
-    Corners ``indptr[c]:indptr[c + 1]`` are those of vertex c, counter-clockwise; at a boundary vertex
-    they begin at the boundary edge. Faces that run against their neighbours are turned.
-
-    Attributes
-    ----------
-    indptr : (n + 1,) int64
-    centre : (k,) int32
-        The vertex c itself.
-    next : (k,) int32
-        The next edge neighbour a.
-    diagonal : (k,) int32
-        The vertex d across the quad, -1 in a triangle.
-    previous : (k,) int32
-        The previous edge neighbour b; in a closed ring it is the next corner's a.
-    """
-
-    indptr: NDArray[np.int64]
-    centre: Ints
-    next: Ints
-    diagonal: Ints
-    previous: Ints
-
-
-class Frame(NamedTuple):
-    """What surrounds a grid of points: ghosts, or the other side where it wraps.
-
-    Attributes
-    ----------
-    beyond : (6 c,) float64
-        The rows before the first and after the last one.
-    across : (k,) float64
-        The point before the first one of a row is x_0 + sum of across_k (x_k - x_0), that after the last
-        one alike; empty where rows are closed.
-    """
-
-    beyond: Floats
-    across: Floats
-
-
-@dataclass(frozen=True, eq=False)
-class Stencils:
-    """What a scheme reads: faces over points, and which of the points want a curvature.
-
-    Attributes
-    ----------
-    points : (p, 3) float64
-        Positions: first the n vertices with a stencil, then ghosts and dual points.
-    faces : (m, 4) int32
-        Counter-clockwise faces over `points`; a triangle's last entry is -1.
-    shape : tuple of int
-        Shape of a result, (n,) or (r, c) with r c = n.
-    closed : (n,) bool
-        Whether the ring is one closed fan; elsewhere no curvature is known.
-    orientable : bool
-        False where no choice of sides agrees; normals then have an arbitrary sign.
-    """
-
-    points: Floats
-    faces: Ints
-    shape: tuple[int, ...]
-    closed: Bools
-    orientable: bool = True
-
-    @property
-    def n(self) -> int:
-        """Number of vertices with a stencil."""
-        return int(np.prod(self.shape))
-
-    @property
-    def has_triangles(self) -> bool:
-        """Whether any face is a triangle."""
-        return bool((self.faces[:, 3] < 0).any())
-
-    @property
-    def valence(self) -> Ints:
-        """(n,) int32: number of faces at each vertex."""
-        count = np.bincount(self.faces[self.faces >= 0], minlength=len(self.points))
-        return count[: self.n].astype(np.int32)
-
-    @cached_property
-    def ring(self) -> Ints:
-        """(p, 8) int32: (a, d, a, d, ...) around each regular vertex inside, first -1 for all others."""
-        from quadcurv.kernels import topology
-
-        return topology.rings(self.faces, len(self.points))
-
-    @cached_property
-    def irregular(self) -> NDArray[np.int64]:
-        """Vertices with a stencil that have no such ring."""
-        return np.flatnonzero(self.ring[: self.n, 0] < 0)
-
-    @cached_property
-    def ring_areas(self) -> Floats:
-        """(n, 3) float64: half the vector area of each ring polygon; it points along the normal."""
-        from quadcurv.kernels import diamond
-
-        if self.orientable:
-            normal = np.zeros_like(self.points)
-            diamond.ring_normals(self.points, self.faces, normal)
-            normal = normal[: self.n]
-        else:  # faces disagree somewhere: the corner table has each ring turned one way
-            indptr, c, a, _, b = self.corner_table
-            corner = np.cross(self.points[a] - self.points[c], self.points[b] - self.points[c])
-            sums = scipy.sparse.csr_array((np.full(c.size, 0.25), np.arange(c.size), indptr))
-            normal = sums @ corner
-        # A length that is lost to underflow gives no direction.
-        normal[np.einsum("ix,ix->i", normal, normal) < np.finfo(float).tiny] = 0
-        return normal
-
-    @cached_property
-    def corner_table(self) -> CornerTable:
-        """Corners of the n vertices, ring by ring."""
-        from quadcurv.kernels import topology
-
-        indptr, corners = topology.corners_by_vertex(self.faces, len(self.points))
-        _, flipped, *_ = topology.order_rings(self.faces, indptr, corners, np.arange(self.n))
-        indptr = indptr[: self.n + 1]
-        face, slot = np.divmod(corners[: indptr[-1]], 4)
-        quad = self.faces[face, 3] >= 0
-        sides = np.where(quad, 4, 3)
-        turn = np.where(flipped[: indptr[-1]], -1, 1)
-
-        def vertex(step: Any) -> Ints:
-            return self.faces[face, (slot + step) % sides]
-
-        return CornerTable(
-            indptr,
-            vertex(0),
-            vertex(turn),
-            np.where(quad, vertex(2), np.int32(-1)),
-            vertex(-turn),
-        )
 
 
 class QuadMesh:
@@ -232,8 +86,8 @@ class QuadMesh:
     recovery: Recovery | None = None
 
     def __init__(self, points: ArrayLike, faces: ArrayLike | Sequence[Sequence[int]]) -> None:
-        self.points = _checked_points(points, "points", ("n", 3))
-        self.faces, self._source, self.n_split = _checked_faces(faces, self.points)
+        self.points = checked_points(points, "points", ("n", 3))
+        self.faces, self._source, self.n_split = checked_faces(faces, self.points)
         self.n_flipped, self.orientable = 0, True
         self._shared: dict[str, Any] = {}
         self._orient()
@@ -260,7 +114,7 @@ class QuadMesh:
                 f"first the one from vertex {bad_edge[0]} to {bad_edge[1]}"
             )
         if n_disagree:
-            turn, self.orientable = _consistent_sides(self.faces)
+            turn, self.orientable = consistent_sides(self.faces)
             self.n_flipped = int(np.count_nonzero(turn))
             quad = self.faces[:, 3] >= 0
             self.faces[turn & quad] = self.faces[turn & quad][:, [0, 3, 2, 1]]
@@ -281,113 +135,6 @@ class QuadMesh:
         stencils = Stencils(self.points, self.faces, (len(self.points),), closed, self.orientable)
         stencils.__dict__.update(ring=self._ring, irregular=self._others)
         return stencils
-
-    @staticmethod
-    def from_trimesh(mesh: Any, quads: ArrayLike | None = None) -> QuadMesh:
-        """Make a mesh of a trimesh.Trimesh, its quads put together again where its data says how.
-
-        trimesh knows triangles only. The first rule that fits is used, and named in `recovery`:
-
-        - "given": `quads`;
-        - "carrier": what :meth:`to_trimesh` left; it survives reordering and removing of faces;
-        - "ply": polygons of the PLY file the Trimesh was loaded from, if the triangles are still those;
-        - "block", "interleaved": the two orders in which trimesh cuts quads (a, b, c, d) into (a, b, c) and
-          (c, d, a). Every pair is checked to share that diagonal. At least half of the triangles must pair:
-          a mesh of genuine triangles has few such pairs, and they are left alone;
-        - "diagonal": the same pairs in any order, if nine in ten triangles pair;
-        - "none": genuine triangles, as far as one can know; :func:`quadcurv.pair_triangles` pairs them by
-          their shape, on request only.
-
-        ``QuadMesh(mesh.vertices, mesh.faces)`` keeps the triangles whatever their order says.
-
-        Parameters
-        ----------
-        mesh : trimesh.Trimesh or trimesh.Scene
-            A Scene of one Trimesh is taken where it stands.
-        quads : (m, 4) array_like of int or sequence of polygons, optional
-            The faces over the vertices of `mesh`, where the caller knows them.
-
-        Returns
-        -------
-        QuadMesh
-            Over all vertices of `mesh`, in their order.
-
-        Raises
-        ------
-        MeshError
-            A ValueError: no mesh, or a Scene of several.
-        TypeError
-            Another type.
-        """
-        from quadcurv import interop
-
-        return interop.from_trimesh(mesh, quads)
-
-    def to_trimesh(self) -> Any:
-        """Return a trimesh.Trimesh; its triangles are the quads (a, b, c, d) cut as (a, b, c), (c, d, a).
-
-        Triangles come first, then the first halves, then the second ones, as trimesh cuts quads itself.
-        The face attribute "quadcurv" says what they were cut from, for :meth:`from_trimesh`.
-        """
-        from quadcurv import interop
-
-        return interop.to_trimesh(self)
-
-    @staticmethod
-    def from_pyvista(dataset: Any) -> QuadMesh:
-        """Make a mesh of a pyvista.PolyData, or of an UnstructuredGrid of polygons.
-
-        Triangles stay triangles: pyvista keeps quads by itself. Lines and vertex cells of a PolyData are
-        not read. A StructuredGrid is a :class:`QuadGrid`.
-
-        Raises
-        ------
-        MeshError
-            A ValueError: triangle strips, volume cells (with the first), no faces.
-        TypeError
-            Another type.
-        """
-        from quadcurv import interop
-
-        return interop.from_pyvista(dataset)
-
-    def to_pyvista(self) -> Any:
-        """Return a pyvista.PolyData with the same points, in double precision, and faces."""
-        from quadcurv import interop
-
-        return interop.to_pyvista(self)
-
-    @staticmethod
-    def from_pymeshlab(mesh: Any) -> QuadMesh:
-        """Make a mesh of a pymeshlab.Mesh, or of the current mesh of a MeshSet, where it stands.
-
-        MeshLab keeps a quad as two triangles and a hidden diagonal: quads and polygons come back, but the
-        vertex that a face begins with may be another.
-
-        Raises
-        ------
-        MeshError
-            A ValueError: an empty MeshSet, deleted elements, no faces.
-        TypeError
-            Another type.
-        """
-        from quadcurv import interop
-
-        return interop.from_pymeshlab(mesh)
-
-    def to_pymeshlab(self) -> Any:
-        """Return a pymeshlab.MeshSet with this mesh in it, in double precision.
-
-        The set, since a pymeshlab.Mesh taken out of it does not outlive it.
-
-        Raises
-        ------
-        ImportError
-            pymeshlab, of the extra ``quadcurv[meshlab]``, is not installed.
-        """
-        from quadcurv import interop
-
-        return interop.to_pymeshlab(self)
 
     def remember(self, name: str, make: Callable[[], Any]) -> Any:
         """Return what depends on the connectivity alone, made once for all meshes that share it."""
@@ -443,7 +190,7 @@ class QuadMesh:
         """Return the same faces, not checked again, over other positions of the same shape."""
         mesh = object.__new__(QuadMesh)
         mesh.__dict__.update(self.__dict__)
-        mesh.points = _checked_points(points, "points", self.points.shape)
+        mesh.points = checked_points(points, "points", self.points.shape)
         return mesh
 
 
@@ -464,8 +211,8 @@ class QuadGrid:
     """
 
     def __init__(self, points: ArrayLike, wrap: Sequence[bool] = (False, False)) -> None:
-        self.wrap = _checked_wrap(wrap)
-        self.points = _checked_points(points, "points", ("r", "c", 3))
+        self.wrap = checked_wrap(wrap)
+        self.points = checked_points(points, "points", ("r", "c", 3))
         for axis, name in enumerate(("rows", "columns")):
             least = 3 if self.wrap[axis] else 2
             if self.points.shape[axis] < least:
@@ -492,44 +239,6 @@ class QuadGrid:
         if not self.wrap[1]:
             closed[:, [0, -1]] = False
         return Stencils(self.points.reshape(-1, 3), grid_faces(index), self.shape, closed.ravel())
-
-    @staticmethod
-    def from_pyvista(dataset: Any, wrap: Sequence[bool] = (False, False)) -> QuadGrid:
-        """Make a grid of a pyvista.StructuredGrid of one layer.
-
-        Parameters
-        ----------
-        dataset : pyvista.StructuredGrid
-            Of dimensions (r, c, 1), (r, 1, c) or (1, r, c).
-        wrap : (bool, bool)
-            Directions that are closed: the last row (column), which repeats the first, is dropped.
-
-        Returns
-        -------
-        QuadGrid
-            points[i, j] is VTK's point i + r j.
-
-        Raises
-        ------
-        MeshError
-            A ValueError: a volume, or a seam that does not meet.
-        TypeError
-            Another type.
-
-        Warns
-        -----
-        UserWarning
-            The first and the last row (column) coincide although `wrap` says nothing of it.
-        """
-        from quadcurv import interop
-
-        return interop.from_structured(dataset, wrap)
-
-    def to_pyvista(self) -> Any:
-        """Return a pyvista.StructuredGrid, (r, c, 1), wraps closed by repeating the first row or column."""
-        from quadcurv import interop
-
-        return interop.to_structured(self)
 
     def side(self, axis: int, end: int) -> QuadGrid:
         """Return the two rows (axis 0) or columns (1) at the first (end 0) or last (-1) open side."""
@@ -566,10 +275,10 @@ class StaggeredGrid:
     """
 
     def __init__(self, primal: ArrayLike, dual: ArrayLike, wrap: Sequence[bool] = (False, False)) -> None:
-        self.wrap = _checked_wrap(wrap)
-        self.dual = _checked_points(dual, "dual", ("r + 1", "c + 1", 3))
+        self.wrap = checked_wrap(wrap)
+        self.dual = checked_points(dual, "dual", ("r + 1", "c + 1", 3))
         r, c = (self.dual.shape[0] - 1, self.dual.shape[1] - 1)
-        self.primal = _checked_points(primal, "primal", ("r", "c", 3))
+        self.primal = checked_points(primal, "primal", ("r", "c", 3))
         if r < 1 or c < 1 or self.primal.shape[:2] not in ((r, c), (r + 2, c + 2)):
             raise MeshError(
                 f"primal: shape {self.primal.shape} does not fit dual of shape {self.dual.shape}; "
@@ -686,205 +395,3 @@ class StaggeredGrid:
 
 
 Mesh = QuadMesh | QuadGrid | StaggeredGrid
-
-
-def grid_faces(index: Ints) -> Ints:
-    """Quads of a grid of vertex indices, counter-clockwise about first times second direction."""
-    quads = np.stack((index[:-1, :-1], index[1:, :-1], index[1:, 1:], index[:-1, 1:]), axis=-1)
-    return quads.reshape(-1, 4)
-
-
-def face_pairs(faces: Ints) -> tuple[NDArray[np.int64], ...]:
-    """Faces f, g on the two sides of every interior edge, and the slots i, j at which it begins there."""
-    sides = np.where(faces[:, 3] < 0, 3, 4)
-    face, slot = np.nonzero(np.arange(4) < sides[:, None])
-    start, end = faces[face, slot], faces[face, (slot + 1) % sides[face]]
-    low, high = np.minimum(start, end), np.maximum(start, end)
-    order = np.lexsort((high, low))
-    pair = np.flatnonzero((np.diff(low[order]) == 0) & (np.diff(high[order]) == 0))
-    one, other = order[pair], order[pair + 1]
-    return face[one], slot[one], face[other], slot[other]
-
-
-def _first_and_count(bad: Any) -> tuple[int, int]:
-    return int(np.argmax(bad)), int(np.count_nonzero(bad))
-
-
-def _checked_points(points: ArrayLike, name: str, shape: tuple[Any, ...]) -> Floats:
-    """Read-only C-contiguous float64; a number in `shape` is required, a letter is free."""
-    try:
-        given = np.asarray(points)
-    except (ValueError, OverflowError):  # rows of different lengths, integers beyond all floats
-        given = np.empty(0, object)
-    if np.ma.is_masked(points):
-        raise MeshError(f"{name}: masked entries, expected a number in each")
-    if given.dtype.kind not in "fiu":
-        raise MeshError(f"{name}: expected real numbers, got dtype {given.dtype}")
-    if given.ndim != len(shape) or any(
-        isinstance(want, int) and have != want for have, want in zip(given.shape, shape, strict=True)
-    ):
-        raise MeshError(f"{name}: shape {given.shape}, expected ({', '.join(map(str, shape))})")
-    with np.errstate(over="ignore"):  # of long doubles; they are found below
-        array = np.ascontiguousarray(given, dtype=np.float64).view()
-    array.flags.writeable = False
-    extremes = _extremes(array)
-    if not np.isfinite(extremes).all():  # both are NaN if any entry is
-        first, count = _first_and_count(~np.isfinite(array.reshape(-1, 3)).all(axis=1))
-        where = np.unravel_index(first, array.shape[:-1])
-        at = first if array.ndim == 2 else tuple(map(int, where))
-        raise MeshError(f"{name}: {count} non-finite point(s), first vertex {at}: {array[where]}")
-    if array.size:
-        rows = array.reshape(-1, 3)
-        # The square of an area, hence the fourth power of a length, must neither overflow nor vanish.
-        if np.abs(extremes).max() > _LARGEST:
-            first, count = _first_and_count((np.abs(rows) > _LARGEST).any(axis=1))
-            raise MeshError(
-                f"{name}: {count} point(s) beyond {_LARGEST:g}, whose areas overflow, first vertex {first}"
-            )
-        if np.ptp(rows[:: len(rows) // 8 + 1], axis=0).max() < 1 / _LARGEST and (
-            0 < np.ptp(rows, axis=0).max() < 1 / _LARGEST
-        ):
-            raise MeshError(f"{name}: all within {1 / _LARGEST:g} of each other, where areas vanish")
-    return array
-
-
-def _extremes(array: Floats) -> tuple[float, float]:
-    """Least and largest entry, both NaN if any entry is; 0 of an empty array."""
-    from quadcurv.kernels import parallel
-
-    if array.size == 0:
-        return 0.0, 0.0
-    found = []
-
-    def look(start: int, stop: int) -> None:
-        part = array[start:stop]
-        with np.errstate(invalid="ignore"):
-            found.append((part.min(), part.max()))
-
-    parallel.over(look, len(array), array.size // 3)
-    low, high = np.transpose(found)
-    return low.min(), high.max()
-
-
-def _checked_wrap(wrap: Sequence[bool]) -> tuple[bool, bool]:
-    given = list(wrap) if np.iterable(wrap) else []
-    if len(given) != 2 or not all(isinstance(w, bool | np.bool_) for w in given):
-        raise MeshError(f"wrap: expected two booleans, got {wrap!r}")
-    return bool(given[0]), bool(given[1])
-
-
-def _checked_faces(faces: Any, points: Floats) -> tuple[Ints, NDArray[np.int64] | None, int]:
-    """Faces as (m, 4) int32, the given face each stems from (None: itself), and how many were split."""
-    from quadcurv.kernels import topology
-
-    if len(points) == 0:
-        raise MeshError("points: none given")
-    try:
-        given = np.asarray(faces)
-    except ValueError:  # polygons of different lengths
-        given = np.empty(0, object)
-    if np.ma.is_masked(faces):
-        raise MeshError("faces: masked entries, expected an index in each")
-    if given.ndim == 2 and given.shape[1] in (3, 4) and given.dtype.kind in "iu":
-        if given.dtype == np.uint64:  # the largest must not come out as -1
-            given = np.minimum(given, np.uint64(np.iinfo(np.int64).max))
-        table = np.ascontiguousarray(given, np.int32 if given.dtype == np.int32 else np.int64).view()
-        source, n_split = None, 0
-    elif given.ndim == 2 and given.shape[1] in (3, 4):
-        raise MeshError(f"faces: expected integer indices, got dtype {given.dtype}")
-    else:
-        table, source, n_split = _from_polygons(faces, points)
-    if len(table) == 0:
-        raise MeshError("faces: none given")
-    n = len(points)
-    if n > np.iinfo(np.int32).max // 4:
-        raise MeshError(f"points: {n} are more than 32-bit indices can number")
-    table.flags.writeable = False  # of one type for the compiler, whatever the caller's is
-    checked = np.empty((len(table), 4), np.int32)
-    (outside, n_outside), (repeated, n_repeated) = topology.checked(table, n, checked)
-
-    def given_face(face: int) -> int:
-        return face if source is None else int(source[face])
-
-    if n_outside:
-        raise MeshError(
-            f"faces: {n_outside} face(s) with an index outside 0..{n - 1}, "
-            f"first face {given_face(outside)}: {_padded(table[outside])}"
-        )
-    if n_repeated:
-        raise MeshError(
-            f"faces: {n_repeated} face(s) with a repeated vertex, "
-            f"first face {given_face(repeated)}: {_padded(table[repeated])}"
-        )
-    return checked, source, n_split
-
-
-def _padded(face: Any) -> list[int]:
-    return [*face.tolist(), -1][:4]
-
-
-def _from_polygons(faces: Any, points: Floats) -> tuple[NDArray[np.int64], NDArray[np.int64], int]:
-    """Triangles and quads as they are, larger polygons by ear clipping across their vector area."""
-    import mapbox_earcut
-
-    rows: list[list[int]] = []
-    source: list[int] = []
-    n_split = 0
-    try:
-        polygons = [[operator.index(v) for v in face] for face in faces]
-    except TypeError:
-        raise MeshError(
-            "faces: expected an integer array of shape (m, 3) or (m, 4), or a sequence of polygons"
-        ) from None
-    for i, polygon in enumerate(polygons):
-        if len(polygon) < 3:
-            raise MeshError(f"faces: a face has at least 3 vertices, face {i} has {len(polygon)}")
-        if min(polygon) < (-1 if len(polygon) == 4 else 0) or max(polygon) >= len(points):
-            raise MeshError(f"faces: face {i} has an index outside 0..{len(points) - 1}: {polygon}")
-        pieces = [polygon]
-        if len(polygon) > 4:
-            if len(set(polygon)) < len(polygon):
-                raise MeshError(f"faces: face {i} has a repeated vertex: {polygon}")
-            corners = points[polygon] - points[polygon[0]]
-            normal = np.cross(corners, np.roll(corners, -1, axis=0)).sum(axis=0)
-            # The plane across the normal: the right singular vectors of a row begin with the row.
-            _, _, (along, *plane) = np.linalg.svd(normal[None])
-            if np.linalg.det([along, *plane]) * np.dot(along, normal) < 0:
-                plane.reverse()
-            flat = np.ascontiguousarray(corners @ np.transpose(plane))
-            ears = mapbox_earcut.triangulate_float64(flat, np.array([len(polygon)], np.uint32))
-            if len(ears) != 3 * (len(polygon) - 2):  # it crosses itself, or vertices are in line
-                ears = np.array([(0, v, v + 1) for v in range(1, len(polygon) - 1)])
-            pieces = [[polygon[v] for v in ear] for ear in ears.reshape(-1, 3)]
-            n_split += 1
-        for piece in pieces:
-            rows.append(piece + [-1] * (4 - len(piece)))
-            source.append(i)
-    table = np.array(rows, np.int64).reshape(-1, 4)
-    return table, np.array(source, np.int64), n_split
-
-
-def _consistent_sides(faces: Ints) -> tuple[Bools, bool]:
-    """Which faces to turn, as few as possible, so that neighbours agree; and whether all then do.
-
-    Non-orientable components are left as they are.
-    """
-    m = len(faces)
-    f, i, g, j = face_pairs(faces)
-    same_way = faces[f, i] == faces[g, j]
-    # Node f is face f as given, node f + m the same face turned; an edge joins what goes together.
-    rows = np.concatenate((f, f + m))
-    columns = np.concatenate((np.where(same_way, g + m, g), np.where(same_way, g, g + m)))
-    graph = scipy.sparse.coo_array((np.ones(rows.size, bool), (rows, columns)), shape=(2 * m, 2 * m))
-    label = scipy.sparse.csgraph.connected_components(graph, directed=False)[1]
-    orientable = not bool((label[:m] == label[m:]).any())
-    kept = np.bincount(label[:m], minlength=label.max() + 1)
-    turned = np.bincount(label[m:], minlength=label.max() + 1)
-    # A component and its mirror image differ in which faces they turn: keep the one that turns fewer.
-    ours, theirs = kept[label[:m]], turned[label[:m]]
-    first = np.full(label.max() + 1, m)
-    np.minimum.at(first, label[:m], np.arange(m))
-    mirror = np.empty(label.max() + 1, np.int64)
-    mirror[label[:m]] = label[m:]
-    tie = first[label[:m]] > first[mirror[label[:m]]]
-    return (ours < theirs) | ((ours == theirs) & tie), orientable

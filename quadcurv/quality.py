@@ -10,9 +10,11 @@ from numpy.typing import NDArray
 
 from quadcurv.boundary import EXTRAPOLATED, INTERIOR, OPEN, boundary_treatment, roughness
 from quadcurv.curvature import mean_curvature
-from quadcurv.interop import as_mesh
-from quadcurv.mesh import Bools, Floats, QuadMesh, Stencils
+from quadcurv.io import as_mesh
+from quadcurv.mesh import QuadMesh
 from quadcurv.schemes import SCHEMES
+from quadcurv.stencils import Stencils
+from quadcurv.types import Bools, Floats
 
 
 def quality(mesh: Any) -> dict[str, NDArray[Any]]:

@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 import quadcurv as qc
 from quadcurv import SCHEMES, MeshError, QuadGrid, QuadMesh, Scheme, StaggeredGrid, surfaces
 from quadcurv.boundary import OPEN, boundary_treatment, roughness
-from quadcurv.compare import compare
+from quadcurv.comparison import compare
 from quadcurv.quality import quality, summary
 
 LAPLACIANS = [name for name, scheme in SCHEMES.items() if isinstance(scheme, Scheme)]

@@ -16,8 +16,9 @@ import pyvista
 import trimesh
 
 import quadcurv
-from quadcurv import cli, surfaces, view
-from quadcurv.compare import compare
+from quadcurv import cli, surfaces
+from quadcurv.comparison import compare
+from quadcurv.viewing import window
 
 
 @pytest.fixture
@@ -25,7 +26,7 @@ def ball(tmp_path):
     """File of a sphere of quads in eight corners of valence 3."""
     mesh = surfaces.cubed_sphere().sample((6, 6), "faces")[0]
     path = tmp_path / "ball.obj"
-    quadcurv.interop.write(path, mesh)
+    quadcurv.io.write(path, mesh)
     return path
 
 
@@ -60,7 +61,7 @@ def test_compare_prints_tables_of_80_columns_and_saves_pictures(ball, tmp_path, 
     assert all(name in out for name in quadcurv.SCHEMES)
     assert "…" not in out
     assert max(map(len, out.splitlines())) <= 80
-    suffix = "html" if view.opengl_problem() else "png"
+    suffix = "html" if window.opengl_problem() else "png"
     written = sorted(p.name for p in (tmp_path / "maps").iterdir())
     assert written == [f"ball_disagreement.{suffix}", f"ball_mean_curvature.{suffix}"]
     assert all(name in error for name in written)
@@ -141,7 +142,7 @@ def test_view_of_a_surface_shows_exact_errors(name, tmp_path):
     assert "H \\u2212 exact" in page.read_text()
 
 
-@pytest.mark.skipif(view.opengl_problem() is not None, reason=f"cannot render: {view.opengl_problem()}")
+@pytest.mark.skipif(window.opengl_problem() is not None, reason=f"cannot render: {window.opengl_problem()}")
 def test_view_as_a_picture(ball, tmp_path):
     from PIL import Image
 

@@ -11,6 +11,7 @@ import trimesh
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+import quadcurv as qc
 from quadcurv import (
     MeshError,
     QuadGrid,
@@ -23,7 +24,7 @@ from quadcurv import (
     vertex_normals,
     write,
 )
-from quadcurv.files import polygons, read_ply
+from quadcurv.io.formats import polygons, read_ply
 
 SINGLE = np.finfo(np.float32).eps
 # Two quads and two triangles of irrational positions, the faces' kinds mixed.
@@ -144,7 +145,7 @@ def test_off_headers(tmp_path, header, colour):
 @pytest.mark.parametrize("suffix", ["vtp", "vtk", "vtu"])
 @pytest.mark.parametrize("dtype", [np.float64, np.float32])
 def test_vtk_files_keep_quads_and_their_own_precision(tmp_path, mesh, suffix, dtype):
-    data = mesh.to_pyvista()
+    data = qc.to_pyvista(mesh)
     data.points = data.points.astype(dtype)
     (data.cast_to_unstructured_grid() if suffix == "vtu" else data).save(tmp_path / f"mesh.{suffix}")
     read_back = read(tmp_path / f"mesh.{suffix}")
@@ -156,7 +157,7 @@ def test_vtk_files_keep_quads_and_their_own_precision(tmp_path, mesh, suffix, dt
 def test_vtk_files_of_grids(tmp_path, suffix):
     grid = surfaces.catenoid().sample((5, 6))[0]
     with pytest.warns(UserWarning, match="last columns") if grid.wrap[1] else _nothing():
-        grid.to_pyvista().save(tmp_path / f"grid.{suffix}")
+        qc.to_pyvista(grid).save(tmp_path / f"grid.{suffix}")
         read_back = read(tmp_path / f"grid.{suffix}")
     assert isinstance(read_back, QuadGrid)
     r, c = grid.shape
@@ -170,7 +171,7 @@ def _nothing():
 
 
 def test_stl_corners_are_merged(tmp_path, mesh):
-    trimesh.Trimesh(POINTS * 1e-9, mesh.to_trimesh().faces, process=False).export(tmp_path / "mesh.stl")
+    trimesh.Trimesh(POINTS * 1e-9, qc.to_trimesh(mesh).faces, process=False).export(tmp_path / "mesh.stl")
     read_back = read(tmp_path / "mesh.stl")
     assert read_back.points.shape == POINTS.shape
     assert np.abs(np.sort(read_back.points, axis=0) - np.sort(POINTS, axis=0) * 1e-9).max() < SINGLE * 1e-8

@@ -11,6 +11,7 @@ import pyvista as pv
 import trimesh
 
 import quadcurv
+import quadcurv as qc
 from quadcurv import (
     MeshError,
     QuadGrid,
@@ -98,7 +99,7 @@ def test_subclasses_are_recognised(mesh):
         pass
 
     assert as_mesh(Mine(POINTS, [[0, 1, 4, 3]], process=False)).faces.tolist() == [[0, 1, 4, 3]]
-    np.testing.assert_array_equal(as_mesh(Yours(mesh.to_pyvista())).faces, mesh.faces)
+    np.testing.assert_array_equal(as_mesh(Yours(qc.to_pyvista(mesh))).faces, mesh.faces)
 
 
 # ----------------------------------------------------------------------------------------- trimesh
@@ -110,7 +111,7 @@ def test_subclasses_are_recognised(mesh):
 def test_a_quad_file_gives_the_same_quads_through_trimesh(tmp_path, surface, suffix, process):
     quads = surface.sample((5, 6), "faces")[0]
     write(tmp_path / f"quads.{suffix}", quads)
-    found = QuadMesh.from_trimesh(trimesh.load_mesh(tmp_path / f"quads.{suffix}", process=process))
+    found = qc.as_mesh(trimesh.load_mesh(tmp_path / f"quads.{suffix}", process=process))
     np.testing.assert_array_equal(found.faces, quads.faces)
     np.testing.assert_array_equal(found.points, quads.points)
     assert found.recovery == Recovery("ply" if suffix == "ply" else "block", 1.0)
@@ -132,7 +133,7 @@ def ascii_ply(path, mesh):
 def test_a_quad_dominant_file_gives_the_same_faces_through_trimesh(tmp_path, mesh, suffix, rule):
     path = tmp_path / f"mixed.{suffix}"
     (ascii_ply if suffix == "ply" else write)(path, mesh)
-    found = QuadMesh.from_trimesh(trimesh.load_mesh(path))
+    found = qc.as_mesh(trimesh.load_mesh(path))
     assert found.recovery == Recovery(rule, 4 / 6)
     assert sorted(found.faces.tolist()) == sorted(mesh.faces.tolist())
 
@@ -164,17 +165,17 @@ def test_quads_given_to_trimesh_or_by_the_caller(mesh):
     assert as_mesh(given).recovery == Recovery("block", 1.0)
     assert as_mesh(given).faces.tolist() == [[0, 1, 4, 3], [2, 6, 7, 5]]
     # The caller's word comes first, even against the order.
-    found = QuadMesh.from_trimesh(given, quads=[[1, 4, 3, 0], [6, 7, 5]])
+    found = qc.as_mesh(given, quads=[[1, 4, 3, 0], [6, 7, 5]])
     assert found.faces.tolist() == [[1, 4, 3, 0], [6, 7, 5, -1]]
     assert found.recovery == Recovery("given", 0.5)
     with pytest.raises(MeshError, match=r"outside 0\.\.7"):
-        QuadMesh.from_trimesh(given, quads=[[1, 4, 3, 8]])
+        qc.as_mesh(given, quads=[[1, 4, 3, 8]])
     assert QuadMesh(given.vertices, given.faces).faces[:, 3].max() == -1
 
 
 @pytest.mark.parametrize("change", ["none", "copy", "shuffle", "invert", "scale", "join"])
 def test_what_to_trimesh_leaves_finds_the_quads_again(mesh, rng, change):
-    out = mesh.to_trimesh()
+    out = qc.to_trimesh(mesh)
     np.testing.assert_array_equal(out.vertices, mesh.points)
     faces = mesh.faces
     if change == "copy":
@@ -217,7 +218,7 @@ def test_a_trimesh_is_not_changed(mesh):
     assert given.identifier_hash == before[0]
     np.testing.assert_array_equal(given.faces, before[2])
     given.vertices += 1.0  # not frozen either
-    out = mesh.to_trimesh()
+    out = qc.to_trimesh(mesh)
     out.vertices += 1.0
     np.testing.assert_array_equal(mesh.points, POINTS)
 
@@ -226,11 +227,11 @@ def test_a_scene_of_one_mesh_is_taken_where_it_stands(mesh):
     turn = trimesh.transformations.rotation_matrix(0.3, [1, 2, 3])
     turn[:3, 3] = 1, 2, 3
     scene = trimesh.Scene()
-    scene.add_geometry(mesh.to_trimesh(), transform=turn)
+    scene.add_geometry(qc.to_trimesh(mesh), transform=turn)
     found = as_mesh(scene)
     np.testing.assert_allclose(found.points, POINTS @ turn[:3, :3].T + turn[:3, 3], rtol=0, atol=1e-14)
     np.testing.assert_array_equal(found.faces, mesh.faces)
-    scene.add_geometry(mesh.to_trimesh())
+    scene.add_geometry(qc.to_trimesh(mesh))
     with pytest.raises(MeshError, match="a Scene of 2 geometries, expected one; to_mesh"):
         as_mesh(scene)
     with pytest.raises(MeshError, match=r"a Scene of 0 geometries, expected one$"):
@@ -247,17 +248,17 @@ def test_an_empty_or_damaged_trimesh():
         with pytest.raises(MeshError, match=r"outside 0\.\.7, first face"):
             as_mesh(broken)
     with pytest.raises(TypeError, match=r"expected a trimesh.Trimesh"):
-        QuadMesh.from_trimesh(pv.Plane())
+        qc.as_mesh(pv.Plane())
 
 
 # ----------------------------------------------------------------------------------------- pyvista
 
 
 def test_polydata_both_ways(mesh):
-    data = mesh.to_pyvista()
+    data = qc.to_pyvista(mesh)
     assert data.points.dtype == np.float64
     np.testing.assert_array_equal(data.faces, [4, 0, 1, 4, 3, 3, 1, 2, 4, 3, 2, 5, 4, 4, 2, 6, 7, 5])
-    for found in (as_mesh(data), QuadMesh.from_pyvista(data)):
+    for found in (as_mesh(data), qc.as_mesh(data)):
         np.testing.assert_array_equal(found.points, POINTS)
         np.testing.assert_array_equal(found.faces, mesh.faces)
         assert found.recovery is None
@@ -270,7 +271,7 @@ def test_polydata_of_every_kind(mesh):
     assert as_mesh(regular).faces.tolist() == [[0, 1, 4, 3], [2, 6, 7, 5]]
     pentagon = pv.PolyData(POINTS, [5, 0, 1, 2, 5, 3])
     assert as_mesh(pentagon).n_split == 1
-    single = mesh.to_pyvista()
+    single = qc.to_pyvista(mesh)
     single.points = single.points.astype(np.float32)
     np.testing.assert_array_equal(as_mesh(single).points, POINTS.astype(np.float32))
     # Quads that were triangulated on purpose stay triangles.
@@ -282,7 +283,7 @@ def test_polydata_of_every_kind(mesh):
 def test_unstructured_grids_of_polygons(mesh):
     pixels = pv.ImageData(dimensions=(3, 3, 1)).cast_to_unstructured_grid()
     assert as_mesh(pixels).faces.tolist() == [[0, 1, 4, 3], [1, 2, 5, 4], [3, 4, 7, 6], [4, 5, 8, 7]]
-    grid = mesh.to_pyvista().cast_to_unstructured_grid()
+    grid = qc.to_pyvista(mesh).cast_to_unstructured_grid()
     np.testing.assert_array_equal(as_mesh(grid).faces, mesh.faces)
 
 
@@ -329,31 +330,31 @@ def test_structured_grids_whatever_the_axis_of_one_layer(axis, rng):
 @pytest.mark.parametrize("wrap", [(False, False), (True, False), (False, True), (True, True)])
 def test_grids_both_ways(wrap, rng):
     grid = QuadGrid(rng.standard_normal((5, 6, 3)), wrap)
-    data = grid.to_pyvista()
+    data = qc.to_pyvista(grid)
     assert data.dimensions == (5 + wrap[0], 6 + wrap[1], 1)
-    found = QuadGrid.from_pyvista(data, wrap)
+    found = qc.as_mesh(data, wrap)
     assert found.wrap == wrap
     np.testing.assert_array_equal(found.points, grid.points)
 
 
 def test_seams_of_grids_are_reported_and_closed_on_request(torus):
-    data = torus.to_pyvista()
+    data = qc.to_pyvista(torus)
     with pytest.warns(UserWarning, match="coincide: it is open along a seam") as warned:
         as_mesh(data)
     assert [str(w.message).split()[3] for w in warned] == ["rows", "columns"]
     open_ = QuadGrid(np.random.default_rng(0).random((4, 5, 3))).to_pyvista()
     with pytest.raises(MeshError, match=r"first and last columns differ by .* although they wrap"):
-        QuadGrid.from_pyvista(open_, wrap=(False, True))
+        qc.as_mesh(open_, wrap=(False, True))
 
 
 def test_pyvista_types_that_another_verb_takes():
     grid = QuadGrid(np.random.default_rng(0).random((4, 5, 3))).to_pyvista()
     with pytest.raises(TypeError, match=r"use QuadGrid\.from_pyvista"):
-        QuadMesh.from_pyvista(grid)
+        qc.as_mesh(grid)
     with pytest.raises(TypeError, match=r"expected a pyvista.StructuredGrid, got PolyData"):
-        QuadGrid.from_pyvista(pv.Plane())
+        qc.as_mesh(pv.Plane())
     with pytest.raises(TypeError, match="expected a PolyData, StructuredGrid"):
-        QuadMesh.from_pyvista(trimesh.creation.box())
+        qc.as_mesh(trimesh.creation.box())
 
 
 def test_seams_of_face_lists_are_reported():
@@ -366,9 +367,9 @@ def test_seams_of_face_lists_are_reported():
 
 
 def test_meshlab_both_ways_in_double(meshlab, mesh):
-    meshes = mesh.to_pymeshlab()
+    meshes = qc.to_pymeshlab(mesh)
     np.testing.assert_array_equal(meshes.current_mesh().vertex_matrix(), POINTS)
-    for found in (as_mesh(meshes), as_mesh(meshes.current_mesh()), QuadMesh.from_pymeshlab(meshes)):
+    for found in (as_mesh(meshes), as_mesh(meshes.current_mesh()), qc.as_mesh(meshes)):
         np.testing.assert_array_equal(found.points, POINTS)
         assert [sorted(f) for f in found.faces.tolist()] == [sorted(f) for f in mesh.faces.tolist()]
     H, ours = mean_curvature(meshes, boundary="nan"), mean_curvature(mesh, boundary="nan")
@@ -376,7 +377,7 @@ def test_meshlab_both_ways_in_double(meshlab, mesh):
 
 
 def test_a_meshlab_mesh_is_taken_where_it_stands(meshlab, mesh):
-    meshes = mesh.to_pymeshlab()
+    meshes = qc.to_pymeshlab(mesh)
     meshes.compute_matrix_from_translation(traslmethod=0, axisx=1.0, axisy=2.0, axisz=3.0, freeze=False)
     np.testing.assert_allclose(as_mesh(meshes).points, POINTS + np.array([1, 2, 3]), rtol=0, atol=1e-14)
 
@@ -387,13 +388,13 @@ def test_meshlab_meshes_that_are_none(meshlab):
     with pytest.raises(MeshError, match="faces: none given"):
         as_mesh(meshlab.Mesh(POINTS))
     with pytest.raises(TypeError, match=r"expected a pymeshlab.MeshSet or Mesh, got PolyData"):
-        QuadMesh.from_pymeshlab(pv.Plane())
+        qc.as_mesh(pv.Plane())
 
 
 def test_without_meshlab_its_extra_is_named(monkeypatch, mesh):
     monkeypatch.setitem(sys.modules, "pymeshlab", None)
     with pytest.raises(ImportError, match=r'pip install "quadcurv\[meshlab\]"'):
-        mesh.to_pymeshlab()
+        qc.to_pymeshlab(mesh)
 
 
 # ------------------------------------------------------------------------------------------ attach
@@ -401,7 +402,7 @@ def test_without_meshlab_its_extra_is_named(monkeypatch, mesh):
 
 def test_results_in_trimesh():
     quads = surfaces.torus().sample((8, 6), "faces")[0]
-    out = quads.to_trimesh()
+    out = qc.to_trimesh(quads)
     H, Hn = mean_curvature(out), mean_curvature_normal(out)
     attach(out, "H", H)
     attach(out, "Hn", Hn)
@@ -423,7 +424,7 @@ def test_results_in_trimesh():
 
 
 def test_results_in_pyvista(mesh):
-    data = mesh.to_pyvista()
+    data = qc.to_pyvista(mesh)
     values = np.arange(8.0)
     attach(data, "H", values)
     attach(data, "Hn", np.ones((8, 3)))
@@ -436,7 +437,7 @@ def test_results_in_pyvista(mesh):
 @pytest.mark.parametrize("wrap", [(False, False), (True, False), (True, True)])
 def test_results_in_structured_grids(rng, wrap):
     grid = QuadGrid(rng.standard_normal((7, 6, 3)), wrap)
-    data = grid.to_pyvista()
+    data = qc.to_pyvista(grid)
     attach(data, "H", mean_curvature(grid))
     attach(data, "Hn", mean_curvature_normal(grid))
     attach(data, "at", grid.points)
@@ -449,7 +450,7 @@ def test_results_in_structured_grids(rng, wrap):
 
 
 def test_results_in_meshlab(meshlab, mesh):
-    meshes = mesh.to_pymeshlab()
+    meshes = qc.to_pymeshlab(mesh)
     H = np.pi * np.arange(8.0)
     H[2] = np.nan
     attach(meshes, "H", H)
@@ -469,7 +470,12 @@ def test_results_in_meshlab(meshlab, mesh):
 
 def test_results_that_do_not_fit(meshlab, mesh):
     grid = QuadGrid(np.random.default_rng(0).random((7, 6, 3))).to_pyvista()
-    for target, n in ((mesh.to_trimesh(), 8), (mesh.to_pyvista(), 8), (mesh.to_pymeshlab(), 8), (grid, 42)):
+    for target, n in (
+        (qc.to_trimesh(mesh), 8),
+        (qc.to_pyvista(mesh), 8),
+        (qc.to_pymeshlab(mesh), 8),
+        (grid, 42),
+    ):
         with pytest.raises(MeshError, match=rf"H: shape \(7,\), expected \({n},\) or \({n}, 3\)"):
             attach(target, "H", np.zeros(7))
         with pytest.raises(MeshError, match="H: expected real numbers"):
@@ -500,7 +506,7 @@ print(np.median(H))
 
 def test_the_accessor_of_polydata(mesh):
     quads = surfaces.torus().sample((8, 6), "faces")[0]
-    data = quads.to_pyvista()
+    data = qc.to_pyvista(quads)
     before = data.copy()
     np.testing.assert_array_equal(data.quadcurv.mean_curvature(), mean_curvature(quads))
     np.testing.assert_array_equal(
@@ -532,7 +538,7 @@ def test_the_accessor_of_structured_grids(torus, axis):
 
 def test_the_accessor_compares(torus):
     quads = torus.to_mesh()
-    found = quads.to_pyvista().quadcurv.compare(["finite_volume", "liu"], exact=0.5)
+    found = qc.to_pyvista(quads).quadcurv.compare(["finite_volume", "liu"], exact=0.5)
     assert list(found.mean_curvature) == ["finite_volume", "liu"]
     np.testing.assert_array_equal(found.mean_curvature["liu"], mean_curvature(quads, "liu"))
 
@@ -564,7 +570,7 @@ def test_real_meshes_through_every_library(shared_meshes, tmp_path, meshlab, nam
     H = mean_curvature(mesh, "liu", "nan")
     kept = trimesh.Trimesh(mesh.points, process=False)
     kept.faces = trimesh.geometry.triangulate_quads([[v for v in f if v >= 0] for f in mesh.faces.tolist()])
-    for other in (mesh.to_trimesh(), mesh.to_pyvista(), mesh.to_pymeshlab(), kept):
+    for other in (qc.to_trimesh(mesh), qc.to_pyvista(mesh), qc.to_pymeshlab(mesh), kept):
         found = mean_curvature(other, "liu", "nan")
         np.testing.assert_allclose(found, H, rtol=0, atol=1e-9 * np.nanmax(np.abs(H)))
     for suffix in ("obj", "off", "ply", "vtp"):

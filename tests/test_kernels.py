@@ -21,7 +21,7 @@ from numba import config, njit
 import quadcurv as qc
 from comparisons.performance import interpreted
 from quadcurv import SCHEMES, QuadGrid, QuadMesh, StaggeredGrid
-from quadcurv.kernels import compiled, diamond, parallel, topology
+from quadcurv.kernels import compiled, diamond, ranges, topology
 
 NAMES = ("mean_curvature", "mean_curvature_normal", "vertex_normals", "dual_areas")
 DIRECT = ("finite_volume", "liu")
@@ -223,10 +223,10 @@ def test_loops_are_as_wide_as_the_processor():
 @pytest.mark.parametrize(("size", "least"), [(1, 1), (31, 16), (32, 16), (1000, 16), (10**6, 64), (7, 100)])
 @pytest.mark.parametrize("threads", [2, 3, 16])
 def test_ranges_become_smaller_and_make_up_the_whole(size, least, threads, monkeypatch):
-    monkeypatch.setattr(parallel, "SERIAL_BELOW", 0)
+    monkeypatch.setattr(ranges, "SERIAL_BELOW", 0)
     done = []
     qc.set_threads(threads)
-    parallel.over(lambda start, stop: done.append((start, stop)), size, size, least)
+    ranges.over(lambda start, stop: done.append((start, stop)), size, size, least)
     done.sort()
     assert [start for start, _ in done] == [0, *(stop for _, stop in done[:-1])]
     assert done[-1][1] == size
@@ -247,7 +247,7 @@ def test_results_are_bitwise_the_same_for_any_number_of_threads(scheme, threads,
     cells = StaggeredGrid(points[1::2, 1::2], points[::2, ::2])
     meshes = (grid, mesh, cells)
     before = [qc.evaluate(m, *NAMES, scheme=scheme) for m in meshes]
-    monkeypatch.setattr(parallel, "SERIAL_BELOW", 0)
+    monkeypatch.setattr(ranges, "SERIAL_BELOW", 0)
     monkeypatch.setattr(diamond, "LEAST_ROWS", 1)
     qc.set_threads(threads)
     for one, many in zip(before, (qc.evaluate(m, *NAMES, scheme=scheme) for m in meshes), strict=True):
@@ -365,28 +365,28 @@ def test_inside_dask_workers():
 
 def test_number_of_threads_from_the_environment(monkeypatch):
     monkeypatch.setenv("QUADCURV_NUM_THREADS", "3")
-    assert parallel.threads() == 3
+    assert ranges.threads() == 3
     qc.set_threads(2)
-    assert parallel.threads() == 2
+    assert ranges.threads() == 2
     qc.set_threads(None)
     monkeypatch.setenv("QUADCURV_NUM_THREADS", "many")
-    assert 1 <= parallel.threads() <= (os.cpu_count() or 1)
+    assert 1 <= ranges.threads() <= (os.cpu_count() or 1)
 
 
 def test_without_a_thread_to_be_had_the_caller_computes(monkeypatch):
     def refuse(*_):
         raise RuntimeError("can't start new thread")
 
-    monkeypatch.setattr(parallel, "SERIAL_BELOW", 0)
+    monkeypatch.setattr(ranges, "SERIAL_BELOW", 0)
     monkeypatch.setattr(ThreadPoolExecutor, "submit", refuse)
     done = []
     qc.set_threads(2)
-    parallel.over(lambda start, stop: done.append((start, stop)), 10, 10)
+    ranges.over(lambda start, stop: done.append((start, stop)), 10, 10)
     assert [i for cut in done for i in range(*cut)] == list(range(10))
 
 
 def test_an_error_in_another_thread_is_raised_and_nothing_waits_inside_another_call(monkeypatch):
-    monkeypatch.setattr(parallel, "SERIAL_BELOW", 0)
+    monkeypatch.setattr(ranges, "SERIAL_BELOW", 0)
     qc.set_threads(2)
     caller = threading.get_ident()
 
@@ -396,14 +396,14 @@ def test_an_error_in_another_thread_is_raised_and_nothing_waits_inside_another_c
         time.sleep(0.05)
 
     with pytest.raises(ZeroDivisionError, match="far away"):
-        parallel.over(fail, 10, 10)
+        ranges.over(fail, 10, 10)
 
     done = []
 
     def inner(start, stop):
-        parallel.over(lambda i, j: done.extend(range(start + i, start + j)), stop - start, stop - start)
+        ranges.over(lambda i, j: done.extend(range(start + i, start + j)), stop - start, stop - start)
 
-    parallel.over(inner, 100, 100)  # by a pool all of whose threads are busy with the outer call
+    ranges.over(inner, 100, 100)  # by a pool all of whose threads are busy with the outer call
     assert sorted(done) == list(range(100))
 
 
@@ -493,7 +493,7 @@ def test_stiffness_is_refreshed_in_place(scheme, monkeypatch):
     moved = mesh.with_points(points + 0.1 * np.sin(points[:, ::-1]))
     fresh = qc.stiffness_matrix(moved, scheme)
     assert abs(S - fresh).max() > 0.01
-    monkeypatch.setattr(parallel, "SERIAL_BELOW", 0)
+    monkeypatch.setattr(ranges, "SERIAL_BELOW", 0)
     qc.set_threads(3)
     assert qc.stiffness_matrix(moved, scheme, out=S) is S
     for one, other, expected in zip(

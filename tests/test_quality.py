@@ -7,8 +7,8 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from quadcurv import SCHEMES, QuadGrid, QuadMesh, Scheme, StaggeredGrid, mean_curvature, read, surfaces
+from quadcurv.convergence import fitted_rate
 from quadcurv.quality import quality, summary
-from quadcurv.rates import fitted_rate
 
 LAPLACIANS = [name for name, scheme in SCHEMES.items() if isinstance(scheme, Scheme)]
 CUBE = np.array([(x, y, z) for x in (0, 1) for y in (0, 1) for z in (0, 1)], float)

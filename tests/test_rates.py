@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from quadcurv.rates import fitted_rate, successive_rates
+from quadcurv.convergence import fitted_rate, successive_rates
 
 
 def test_power_laws_are_recovered() -> None:

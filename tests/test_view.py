@@ -19,9 +19,11 @@ import pytest
 import pyvista
 from PIL import Image, ImageGrab
 
-from quadcurv import QuadGrid, QuadMesh, fields, surfaces, view
-from quadcurv.compare import Comparison, compare, convergence
+from quadcurv import QuadGrid, QuadMesh, surfaces
+from quadcurv.comparison import Comparison, compare
+from quadcurv.convergence import convergence
 from quadcurv.quality import quality
+from quadcurv.viewing import fields, window
 
 IMAGES = Path(__file__).parent / "images"
 GL_LIBRARIES = [
@@ -31,7 +33,7 @@ GL_LIBRARIES = [
 ]
 
 needs_opengl = pytest.mark.skipif(
-    view.opengl_problem() is not None, reason=f"cannot render: {view.opengl_problem()}"
+    window.opengl_problem() is not None, reason=f"cannot render: {window.opengl_problem()}"
 )
 
 
@@ -250,7 +252,7 @@ def is_like(picture, reference):
 @pytest.mark.parametrize("field", ["mean_curvature", "error"])
 def test_picture_is_the_one_kept(pillow, ellipsoid, tmp_path, field):
     comparison = {"mean_curvature": ellipsoid, "error": pillow}[field]
-    view.save_maps(comparison, tmp_path / "map.png", field)
+    window.save_maps(comparison, tmp_path / "map.png", field)
     kept = IMAGES / f"{field}.png"
     if os.environ.get("QUADCURV_KEEP_IMAGES"):
         with Image.open(tmp_path / "map.png") as image:
@@ -259,7 +261,7 @@ def test_picture_is_the_one_kept(pillow, ellipsoid, tmp_path, field):
     reference = pixels(kept)
     size = reference.shape[1::-1]
     assert is_like(pixels(tmp_path / "map.png", size), reference)
-    view.save_maps(comparison, tmp_path / "other.png", "signed_error")
+    window.save_maps(comparison, tmp_path / "other.png", "signed_error")
     assert not is_like(pixels(tmp_path / "other.png", size), reference)  # the tolerance tells maps apart
 
 
@@ -267,10 +269,10 @@ def test_picture_is_the_one_kept(pillow, ellipsoid, tmp_path, field):
 def test_picture_shows_nan_and_zero_in_their_colours(tmp_path):
     H = np.full(40, 1e-2)
     H[:16], H[-16:] = 0.0, np.nan
-    view.save_maps(made_up(a=H), tmp_path / "map.png")
+    window.save_maps(made_up(a=H), tmp_path / "map.png")
     assert grey(tmp_path / "map.png").mean() > 0.007
     assert grey(tmp_path / "map.png")[-180:].any(axis=0).mean() > 0.05  # its patch in the legend
-    view.save_maps(made_up(a=np.linspace(1e-3, 1e-2, 40)), tmp_path / "map.png")
+    window.save_maps(made_up(a=np.linspace(1e-3, 1e-2, 40)), tmp_path / "map.png")
     assert grey(tmp_path / "map.png").mean() < 0.002  # smoothed letters
 
 
@@ -280,7 +282,7 @@ def grey(path):
 
 @needs_opengl
 def test_views_share_one_camera(ellipsoid):
-    plotter = view.maps(ellipsoid)
+    plotter = window.maps(ellipsoid)
     assert len({id(r.camera) for r in plotter.renderers[:3]}) == 1
     plotter.close()
 
@@ -288,7 +290,7 @@ def test_views_share_one_camera(ellipsoid):
 @pytest.mark.parametrize("name", ["map.jpg", "map"])
 def test_unknown_suffix(pillow, tmp_path, name):
     with pytest.raises(ValueError, match=r"path: expected a name ending in \.png or \.html, got map"):
-        view.save_maps(pillow, tmp_path / name)
+        window.save_maps(pillow, tmp_path / name)
 
 
 @needs_opengl
@@ -373,12 +375,12 @@ def without_opengl(tmp_path):
 def test_without_opengl_pages_are_written_and_pictures_refused(without_opengl, tmp_path):
     code = """
 from quadcurv import surfaces, view
-from quadcurv.compare import compare
+from quadcurv.comparison import compare
 found = compare(surfaces.torus().sample((6, 6), "faces")[0], ["liu"])
-view.save_maps(found, "map.html")
+window.save_maps(found, "map.html")
 try:
-    view.save_maps(found, "map.png")
-except view.NoOpenGLError as error:
+    window.save_maps(found, "map.png")
+except window.NoOpenGLError as error:
     print(error)
 """
     run = subprocess.run(
@@ -398,8 +400,8 @@ except view.NoOpenGLError as error:
 def test_without_a_display_no_window_is_opened(monkeypatch, pillow):
     monkeypatch.setattr(sys, "platform", "linux")
     monkeypatch.delenv("DISPLAY", raising=False)
-    with pytest.raises(view.NoOpenGLError, match="no display"):
-        view.view(pillow)
+    with pytest.raises(window.NoOpenGLError, match="no display"):
+        window.view(pillow)
 
 
 # ------------------------------------------------------------------------------------------- the page
@@ -460,7 +462,7 @@ class Page:
 
 @pytest.fixture
 def page(browser, ellipsoid, tmp_path):
-    view.save_maps(ellipsoid, tmp_path / "map.html", "mean_curvature")
+    window.save_maps(ellipsoid, tmp_path / "map.html", "mean_curvature")
     return Page(browser, tmp_path / "map.html")
 
 
@@ -542,7 +544,7 @@ def test_a_click_tells_the_value_in_every_scheme(page, ellipsoid, tmp_path):
 
 
 def test_page_of_cells(browser, pillow, tmp_path):
-    view.save_maps(pillow, tmp_path / "cells.html", "error")
+    window.save_maps(pillow, tmp_path / "cells.html", "error")
     page = Page(browser, tmp_path / "cells.html")
     page.actions().move_to_element(page.all("#views > div")[0]).click().perform()
     kind, cell, *_ = page.text("#picked").replace(",", "").split()
@@ -558,7 +560,7 @@ def test_page_of_cells(browser, pillow, tmp_path):
 
 def test_page_marks_boundaries_and_what_is_undefined(browser, tmp_path):
     strip = made_up(a=[1.0] * 20 + [np.nan] * 20, b=[-2.0] * 40)
-    view.save_maps(strip, tmp_path / "strip.html", "mean_curvature")
+    window.save_maps(strip, tmp_path / "strip.html", "mean_curvature")
     page = Page(browser, tmp_path / "strip.html")
     assert [p.text for p in page.all("#legend .below")] == ["undefined"]
     page.press("o")
@@ -581,7 +583,7 @@ def test_page_needs_no_network_and_logs_no_error(page):
 
 def test_no_name_of_a_scheme_breaks_the_page(browser, tmp_path):
     name = "</script><b>@DATA@"
-    view.save_maps(made_up(**{name: [1.0, 2.0, 3.0, 4.0]}), tmp_path / "name.html")
+    window.save_maps(made_up(**{name: [1.0, 2.0, 3.0, 4.0]}), tmp_path / "name.html")
     assert Page(browser, tmp_path / "name.html").text("#views > div") == name
 
 
@@ -590,8 +592,8 @@ def test_no_name_of_a_scheme_breaks_the_page(browser, tmp_path):
 WINDOW = """
 import json, os, sys
 from quadcurv import surfaces
-from quadcurv.compare import compare
-from quadcurv.view import View
+from quadcurv.comparison import compare
+from quadcurv.viewing.window import View
 
 target = sys.argv[1]
 surface = surfaces.torus()
@@ -607,19 +609,19 @@ view = View(refined(View.START), refined=refined)
 
 def report(_):
     state = {
-        "field": view.field,
-        "picked": view.picked,
-        "shown": sorted(view.shown),
-        "vertices": view.comparison.valence.size,
-        "cameras": [list(r.camera.position) for r in view.plotter.renderers[:2]],
+        "field": window.field,
+        "picked": window.picked,
+        "shown": sorted(window.shown),
+        "vertices": window.comparison.valence.size,
+        "cameras": [list(r.camera.position) for r in window.plotter.renderers[:2]],
     }
     with open(target + ".part", "w") as file:
         json.dump(state, file)
     os.replace(target + ".part", target)
 
 
-view.plotter.add_timer_event(max_steps=10**6, duration=50, callback=report)
-view.plotter.show()
+window.plotter.add_timer_event(max_steps=10**6, duration=50, callback=report)
+window.plotter.show()
 """
 
 
@@ -792,31 +794,31 @@ LARGE_WINDOW = """
 import sys, time
 import numpy as np
 from quadcurv import surfaces
-from quadcurv.compare import compare
-from quadcurv.view import View
+from quadcurv.comparison import compare
+from quadcurv.viewing.window import View
 
 surface = surfaces.torus()
 mesh, xi, eta = surface.sample((500, 500), "faces")
 schemes = ["finite_volume", "liu", "cotan-6", "cotan-8"]
 view = View(compare(mesh, schemes, surface.mean_curvature(xi, eta)), "error")
-view.plotter.show(auto_close=False, interactive_update=True)
+window.plotter.show(auto_close=False, interactive_update=True)
 
 
 def frame():
     times = []
     for _ in range(9):
-        view.plotter.renderers[0].camera.Azimuth(3)
+        window.plotter.renderers[0].camera.Azimuth(3)
         start = time.perf_counter()
-        view.plotter.render()
+        window.plotter.render()
         times.append(time.perf_counter() - start)
     return np.median(times)
 
 
 rest = frame()
-view.plotter.iren.style.InvokeEvent("StartInteractionEvent")
+window.plotter.iren.style.InvokeEvent("StartInteractionEvent")
 turning = frame()
-view.plotter.iren.style.InvokeEvent("EndInteractionEvent")
-points = [r.actors["surface"].mapper.dataset.n_points for r in view.plotter.renderers[:4]]
+window.plotter.iren.style.InvokeEvent("EndInteractionEvent")
+points = [r.actors["surface"].mapper.dataset.n_points for r in window.plotter.renderers[:4]]
 print(turning, rest, *points)
 """
 
@@ -841,7 +843,7 @@ def test_quarter_of_a_million_vertices_turn_smoothly(screen):
 @needs_opengl
 @pytest.mark.parametrize("pixel", [(150, 430), (450, 430)])
 def test_picked_vertex_is_the_nearest_to_the_pixel(ellipsoid, pixel):
-    shown = view.View(ellipsoid, off_screen=True)
+    shown = window.View(ellipsoid, off_screen=True)
     shown.plotter.show(auto_close=False)
     shown.pick(*pixel)
     assert shown.picked is not None

@@ -7,7 +7,7 @@ from functools import partial
 
 import numpy as np
 
-from quadcurv.kernels import parallel
+from quadcurv.kernels import ranges
 from quadcurv.kernels.compiled import helper, kernel, prefetch
 
 ISOLATED, INTERIOR, BOUNDARY, SEVERAL_FANS = 0, 1, 2, 3
@@ -138,7 +138,7 @@ def rings(faces, n):
     """Ring (n, 8) int32 of every vertex, see `regular_rings`."""
     ring, valence, far = np.empty((n, 8), np.int32), np.zeros(n, np.uint8), mean_distance(faces) > FAR
     first_corners(faces, far, ring, valence)
-    parallel.over(partial(regular_rings, faces, far, valence, ring), n, n)
+    ranges.over(partial(regular_rings, faces, far, valence, ring), n, n)
     return ring
 
 

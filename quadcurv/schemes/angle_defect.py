@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from quadcurv.mesh import Floats, Stencils
+from quadcurv.stencils import Stencils
+from quadcurv.types import Floats
 
 
 def angle_defect(stencils: Stencils) -> tuple[Floats, Floats]:

@@ -8,7 +8,9 @@ from typing import Any, NamedTuple
 
 import scipy
 
-from quadcurv.mesh import Floats, Ints, Mesh, Stencils
+from quadcurv.mesh import Mesh
+from quadcurv.stencils import Stencils
+from quadcurv.types import Floats, Ints
 
 
 @dataclass(frozen=True)

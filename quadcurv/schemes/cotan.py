@@ -8,8 +8,9 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-from quadcurv.mesh import Bools, Floats, Ints, Stencils
 from quadcurv.schemes.base import Scheme
+from quadcurv.stencils import Stencils
+from quadcurv.types import Bools, Floats, Ints
 
 VALENCES = (4, 6, 8)
 AREAS = ("barycentric", "voronoi")

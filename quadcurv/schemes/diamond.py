@@ -11,7 +11,9 @@ from functools import partial
 import numpy as np
 import scipy
 
-from quadcurv.mesh import Floats, Frame, Ints, Mesh, QuadGrid, QuadMesh, Stencils
+from quadcurv.mesh import Mesh, QuadGrid, QuadMesh
+from quadcurv.stencils import Frame, Stencils
+from quadcurv.types import Floats, Ints
 
 # Of one vertex of a face list and of one row of a matrix, in vertices of a grid.
 _RING_WORK, _ROW_WORK = 4, 8
@@ -45,7 +47,7 @@ def stiffness(
     `general` gives the rows of all vertices of its stencils. The arrays of `out`, of the same pattern, are
     written to.
     """
-    from quadcurv.kernels import diamond, parallel, topology
+    from quadcurv.kernels import diamond, ranges, topology
 
     n, p, others = stencils.n, len(stencils.points), stencils.irregular
     indptr, rows = np.arange(0, 9 * n + 1, 9), None
@@ -72,7 +74,7 @@ def stiffness(
         out.indices[place], out.data[place] = rows.indices, rows.data
     points, ring = stencils.points.ravel(), stencils.ring
     kernel = partial(diamond.ring_stiffness, points, ring, indptr, out.indices, out.data)
-    parallel.over(kernel, n, _ROW_WORK * n, diamond.BLOCK)
+    ranges.over(kernel, n, _ROW_WORK * n, diamond.BLOCK)
     return out
 
 
@@ -93,7 +95,7 @@ def quad_stiffness(stencils: Stencils) -> scipy.sparse.csr_array:
 
 def write(mesh: Mesh, frame: Frame | None, results: dict[str, Floats], *, liu: int | None) -> None:
     """Run the kernels: see `Scheme.write`; liu is 0 for Liu's dual area, None for the ring polygon's."""
-    from quadcurv.kernels import diamond, parallel
+    from quadcurv.kernels import diamond, ranges
 
     names = ("mean_curvature_normal", "mean_curvature", "vertex_normals", "dual_areas")
     wanted = [results[name].ravel() if name in results else None for name in names]
@@ -113,12 +115,12 @@ def write(mesh: Mesh, frame: Frame | None, results: dict[str, Floats], *, liu: i
                 np.moveaxis(dual, axis, 0)[-1] = first
         points, halo = mesh.primal.ravel(), int(mesh.has_ghosts)
         kernel = partial(diamond.cells, points, *frame, halo, dual.ravel(), liu, *wanted)
-    parallel.over(kernel, r, r * c, diamond.LEAST_ROWS)
+    ranges.over(kernel, r, r * c, diamond.LEAST_ROWS)
 
 
 def _write_rings(mesh: QuadMesh, liu: int | None, wanted: list[Floats | None]) -> None:
     """Regular vertices, in an order that keeps neighbours close where the mesh's own does not."""
-    from quadcurv.kernels import diamond, parallel, topology
+    from quadcurv.kernels import diamond, ranges, topology
 
     n = len(mesh.points)
     order, ring = mesh.ring_order()
@@ -126,12 +128,12 @@ def _write_rings(mesh: QuadMesh, liu: int | None, wanted: list[Floats | None]) -
     if order is not None:
         there, back = order
         points = np.empty(3 * n)
-        parallel.over(partial(diamond.gather, mesh.points.ravel(), there, points), n, n)
+        ranges.over(partial(diamond.gather, mesh.points.ravel(), there, points), n, n)
         found = [None if values is None else np.empty_like(values) for values in wanted]
     far = order is None and mesh.distance > topology.FAR
-    parallel.over(partial(diamond.rings, points, ring, far, liu, *found), n, _RING_WORK * n, diamond.BLOCK)
+    ranges.over(partial(diamond.rings, points, ring, far, liu, *found), n, _RING_WORK * n, diamond.BLOCK)
     if order is not None:
         # Reads from everywhere overlap, writes to everywhere wait: hence not straight to their places.
         for values, ordered in zip(wanted, found, strict=True):
             if values is not None:
-                parallel.over(partial(diamond.gather, ordered, back, values), n, n)
+                ranges.over(partial(diamond.gather, ordered, back, values), n, n)

@@ -7,9 +7,10 @@ from functools import partial
 import numpy as np
 import scipy
 
-from quadcurv.mesh import Floats, Ints, Stencils, face_pairs
 from quadcurv.schemes.base import Scheme
 from quadcurv.schemes.diamond import local_stiffness, quad_stiffness, scatter, stiffness, write
+from quadcurv.stencils import Stencils, face_pairs
+from quadcurv.types import Floats, Ints
 
 
 def _flaps(stencils: Stencils) -> tuple[Ints, scipy.sparse.csr_array]:

@@ -6,8 +6,9 @@ import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
 from quadcurv.boundary import BOUNDARIES, ghost_layer
-from quadcurv.mesh import Floats, Mesh, QuadGrid, QuadMesh, StaggeredGrid
+from quadcurv.mesh import Mesh, QuadGrid, QuadMesh, StaggeredGrid
 from quadcurv.schemes.base import Curvatures, Fit
+from quadcurv.types import Floats
 
 # Central differences by order: weights of the value itself, its first and its second derivative.
 _WEIGHTS = {

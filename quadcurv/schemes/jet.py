@@ -9,8 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from quadcurv.boundary import BOUNDARIES, ghosts, with_ghosts
-from quadcurv.mesh import Bools, Floats, Ints, Mesh, QuadGrid, QuadMesh, StaggeredGrid, Stencils
+from quadcurv.mesh import Mesh, QuadGrid, QuadMesh, StaggeredGrid
 from quadcurv.schemes.base import Curvatures, Fit, StandardErrors
+from quadcurv.stencils import Stencils
+from quadcurv.types import Bools, Floats, Ints
 
 # Most that errors in height, of unit mean square, may grow to in the second derivatives, both in units of
 # the neighbourhood's extent: inside 2, 3 and 10 by degree; at the sides of a grid, where rings beyond the
@@ -323,10 +325,10 @@ def _turn(mesh: Stencils) -> float:
 def _run(fits: Callable[[Any, Floats], None], vertices: Any) -> Floats:
     """Run a kernel over vertices, in ranges by several threads where there are many."""
     from quadcurv.kernels import jet as kernel
-    from quadcurv.kernels import parallel
+    from quadcurv.kernels import ranges
 
     out = np.empty((len(vertices), kernel.COLUMNS))
-    parallel.over(
+    ranges.over(
         lambda start, stop: fits(vertices[start:stop], out[start:stop]),
         len(vertices),
         _WORK * len(vertices),

@@ -7,10 +7,11 @@ from functools import partial
 import numpy as np
 import scipy
 
-from quadcurv.mesh import Floats, Stencils
 from quadcurv.schemes.base import Scheme
 from quadcurv.schemes.cotan import cotan_matrices
 from quadcurv.schemes.diamond import quad_stiffness, stiffness, write
+from quadcurv.stencils import Stencils
+from quadcurv.types import Floats
 
 
 def _apply(stencils: Stencils) -> tuple[Floats, Floats]:

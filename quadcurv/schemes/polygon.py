@@ -7,9 +7,10 @@ from collections.abc import Callable
 import numpy as np
 import scipy
 
-from quadcurv.mesh import Floats, Stencils
 from quadcurv.schemes.base import Scheme
 from quadcurv.schemes.diamond import scatter
+from quadcurv.stencils import Stencils
+from quadcurv.types import Floats
 
 # Corners (m, k, 3) of polygons of k sides -> their stiffness (m, k, k) and parts of the dual areas (m, k).
 Local = Callable[[Floats], tuple[Floats, Floats]]

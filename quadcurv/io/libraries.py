@@ -13,8 +13,10 @@ import numpy as np
 import scipy
 from numpy.typing import ArrayLike, NDArray
 
-from quadcurv import convert, files
-from quadcurv.mesh import Mesh, MeshError, QuadGrid, QuadMesh, Recovery, StaggeredGrid
+from quadcurv import repair
+from quadcurv.io import formats
+from quadcurv.mesh import Mesh, QuadGrid, QuadMesh, Recovery, StaggeredGrid
+from quadcurv.types import MeshError
 
 CARRIER = "quadcurv"  # face attribute of a Trimesh that says which quad a triangle was cut from
 SAME_PLACE = 1e-6  # of the extent of a mesh: single precision is what many files have
@@ -116,10 +118,10 @@ def _recovered_quads(mesh: Any, triangles: NDArray[np.int64]) -> tuple[Any, str]
         return triangles, "none"
     carrier = np.asarray(mesh.face_attributes.get(CARRIER, ()))
     if carrier.shape == (len(triangles),) and carrier.dtype.kind in "iu":
-        return convert.quads_by_carrier(triangles, carrier), "carrier"
+        return repair.quads_by_carrier(triangles, carrier), "carrier"
     if (polygons := _ply_polygons(mesh)) is not None:
         return polygons, "ply"
-    return convert.quads_by_order(triangles)
+    return repair.quads_by_order(triangles)
 
 
 def _ply_polygons(mesh: Any) -> Any:
@@ -143,7 +145,7 @@ def to_trimesh(mesh: QuadMesh) -> Any:
     """See :meth:`quadcurv.QuadMesh.to_trimesh`."""
     import trimesh
 
-    triangles, carrier = convert.split_quads(mesh.faces)
+    triangles, carrier = repair.split_quads(mesh.faces)
     return trimesh.Trimesh(mesh.points.copy(), triangles, process=False, face_attributes={CARRIER: carrier})
 
 
@@ -174,7 +176,7 @@ def from_pyvista(dataset: Any) -> QuadMesh:
         sizes, corners = _sizes_and_corners(dataset.GetPolys())
     else:
         sizes, corners = _polygon_cells(dataset)
-    result = QuadMesh(np.asarray(dataset.points), files.polygons(sizes, corners))
+    result = QuadMesh(np.asarray(dataset.points), formats.polygons(sizes, corners))
     _warn_of_seam(result)
     return result
 
@@ -269,7 +271,7 @@ def from_pymeshlab(mesh: Any) -> QuadMesh:
     mesh = _current_mesh(mesh)
     faces = mesh.polygonal_face_list()
     corners = np.concatenate(faces) if len(faces) else ()
-    result = QuadMesh(mesh.transformed_vertex_matrix(), files.polygons([len(f) for f in faces], corners))
+    result = QuadMesh(mesh.transformed_vertex_matrix(), formats.polygons([len(f) for f in faces], corners))
     _warn_of_seam(result)
     return result
 
@@ -298,7 +300,7 @@ def to_pymeshlab(mesh: QuadMesh) -> Any:
     # A file, since the constructor that takes polygons rounds positions to single precision.
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "quadcurv.ply"
-        files.write_ply(path, mesh.points, mesh.faces, {})
+        formats.write_ply(path, mesh.points, mesh.faces, {})
         meshes.load_new_mesh(str(path))
     return meshes
 
@@ -470,8 +472,8 @@ def read(path: str | os.PathLike[str]) -> QuadMesh | QuadGrid:
 
 def _read(path: Path) -> QuadMesh | QuadGrid:
     suffix = path.suffix.lower()
-    if suffix in files.READERS:
-        mesh = QuadMesh(*files.READERS[suffix](path))
+    if suffix in formats.READERS:
+        mesh = QuadMesh(*formats.READERS[suffix](path))
         _warn_of_seam(mesh)
         return mesh
     if suffix in (".stl", ".glb", ".gltf"):
@@ -481,7 +483,7 @@ def _read(path: Path) -> QuadMesh | QuadGrid:
         if suffix != ".stl":
             return from_trimesh(scene)
         soup = _sole_geometry(scene)
-        return convert.merge_points(QuadMesh(soup.vertices, soup.faces))[0]
+        return repair.merge_points(QuadMesh(soup.vertices, soup.faces))[0]
     if suffix in (".vtp", ".vtu", ".vtk", ".vts"):
         import pyvista
 
@@ -542,7 +544,7 @@ def write(path: str | os.PathLike[str], mesh: Any, point_data: Mapping[str, Arra
         mesh = mesh.to_mesh()
     match path.suffix.lower():
         case ".ply":
-            files.write_ply(path, mesh.points, mesh.faces, data)
+            formats.write_ply(path, mesh.points, mesh.faces, data)
         case ".vtp":
             surface = to_pyvista(mesh)
             surface.point_data.update(data)
@@ -552,7 +554,7 @@ def write(path: str | os.PathLike[str], mesh: Any, point_data: Mapping[str, Arra
         case ".obj" | ".off" as suffix:
             if data:
                 raise MeshError(f"point_data: {suffix} holds no values; .ply and .vtp do")
-            {".obj": files.write_obj, ".off": files.write_off}[suffix](path, mesh.points, mesh.faces)
+            {".obj": formats.write_obj, ".off": formats.write_off}[suffix](path, mesh.points, mesh.faces)
         case suffix:
             raise MeshError(f"{path}: cannot write {suffix or 'a file without suffix'}")
 

@@ -11,9 +11,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, DTypeLike
 
-from quadcurv import fields
-from quadcurv.compare import Comparison
-from quadcurv.fields import NAN_COLOUR, OVERLAYS, ZERO_COLOUR, Field
+from quadcurv.comparison import Comparison
+from quadcurv.viewing import fields
+from quadcurv.viewing.fields import NAN_COLOUR, OVERLAYS, ZERO_COLOUR, Field
 
 _UNDEFINED = -1e30  # what the page takes for NaN
 
@@ -26,7 +26,7 @@ def save_page(comparison: Comparison, path: str | Path, field: str = "mean_curva
     comparison : Comparison
     path : path-like
     field : str
-        The one of :func:`quadcurv.fields.names` to show first.
+        The one of :func:`quadcurv.viewing.fields.names` to show first.
 
     Raises
     ------
@@ -63,7 +63,7 @@ def save_page(comparison: Comparison, path: str | Path, field: str = "mean_curva
         "fields": shown,
         "arrays": [base64.b64encode(a).decode() for a in arrays],
     }
-    template = files("quadcurv").joinpath("page.html").read_text(encoding="utf-8")
+    template = files("quadcurv.viewing").joinpath("page.html").read_text(encoding="utf-8")
     text = json.dumps(data).replace("<", "\\u003c")  # no name can end the script
     Path(path).write_text(template.replace("@DATA@", text), encoding="utf-8")
 

@@ -11,7 +11,8 @@ import pytest
 from rich.console import Console
 
 from quadcurv import QuadMesh, surfaces
-from quadcurv.compare import NORMS, compare, convergence, norms
+from quadcurv.comparison import NORMS, compare, norms
+from quadcurv.convergence import convergence
 from quadcurv.schemes import SCHEMES, cotan
 
 

@@ -21,7 +21,7 @@ from quadcurv import (
     read,
     surfaces,
 )
-from quadcurv.convert import quads_by_carrier, quads_by_order, split_quads
+from quadcurv.repair import quads_by_carrier, quads_by_order, split_quads
 
 
 def same_faces(one, other):

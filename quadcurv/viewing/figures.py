@@ -9,7 +9,8 @@ import numpy as np
 from matplotlib import rc_context
 from matplotlib.figure import Figure
 
-from quadcurv.compare import NORMS, Convergence
+from quadcurv.comparison import NORMS
+from quadcurv.convergence import Convergence
 
 # Okabe and Ito (2008): told apart with every kind of colour blindness.
 _COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#000000")
@@ -31,7 +32,7 @@ def convergence_figure(convergence: Convergence, norms: Sequence[str] = ("one", 
     ----------
     convergence : Convergence
     norms : sequence of str
-        Of :data:`quadcurv.compare.NORMS`.
+        Of :data:`quadcurv.comparison.NORMS`.
 
     Returns
     -------

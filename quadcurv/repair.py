@@ -8,7 +8,9 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-from quadcurv.mesh import Floats, Ints, MeshError, QuadGrid, QuadMesh, Recovery, face_pairs
+from quadcurv.mesh import QuadGrid, QuadMesh, Recovery
+from quadcurv.stencils import face_pairs
+from quadcurv.types import Floats, Ints, MeshError
 
 
 def quads_by_order(triangles: NDArray[np.integer]) -> tuple[NDArray[np.integer], str]:

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from quadcurv.mesh import Floats, Ints, MeshError
+from quadcurv.types import Floats, Ints, MeshError
 
 Polygons = NDArray[np.int64] | list[list[int]]
 

@@ -40,7 +40,7 @@ class PlotterComponent:
         mesh
             Anything :func:`quadcurv.as_mesh` takes. Values of a staggered grid belong to its cells.
         exact : array_like or callable
-            Exact mean curvature in 1 / length; see :func:`quadcurv.compare.compare`.
+            Exact mean curvature in 1 / length; see :func:`quadcurv.comparison.compare`.
         scheme : str, Scheme or Fit
             A name in ``quadcurv.SCHEMES``, or one of ``quadcurv.schemes``.
         limits : (float, float), optional
@@ -58,11 +58,11 @@ class PlotterComponent:
         Raises
         ------
         ValueError
-            As :func:`quadcurv.compare.compare`; limits that are not positive and ascending.
+            As :func:`quadcurv.comparison.compare`; limits that are not positive and ascending.
         """
-        from quadcurv import fields
-        from quadcurv.compare import compare
-        from quadcurv.view import polydata
+        from quadcurv.comparison import compare
+        from quadcurv.viewing import fields
+        from quadcurv.viewing.window import polydata
 
         comparison = compare(mesh, [scheme], exact)
         shown = fields.field(comparison, "error")

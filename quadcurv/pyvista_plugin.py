@@ -9,14 +9,16 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
-from quadcurv import curvature, interop
-from quadcurv.mesh import Floats, Mesh, QuadGrid, QuadMesh
+from quadcurv import curvature
+from quadcurv.io import libraries
+from quadcurv.mesh import Mesh
 from quadcurv.schemes import Fit, Scheme
+from quadcurv.types import Floats
 
 if TYPE_CHECKING:
     import pyvista as pv
 
-    from quadcurv.compare import Comparison
+    from quadcurv.comparison import Comparison
 
 Wrap = Sequence[bool]
 OPEN = (False, False)
@@ -28,7 +30,7 @@ class Accessor:
     Every method returns an array with one entry a point, in the order of ``mesh.points``, and leaves the
     mesh as it is; ``mesh["H"] = mesh.quadcurv.mean_curvature()`` keeps it. `scheme` and `boundary` are
     those of :func:`quadcurv.mean_curvature`; `wrap` says which directions of a StructuredGrid are closed,
-    as in :meth:`quadcurv.QuadGrid.from_pyvista`.
+    as in :meth:`quadcurv.as_mesh`.
 
     Parameters
     ----------
@@ -71,20 +73,20 @@ class Accessor:
     def compare(
         self, schemes: Any = None, exact: Any = None, wrap: Wrap = OPEN, **options: Any
     ) -> Comparison:
-        """Mean curvature by several schemes; see :func:`quadcurv.compare.compare`."""
-        from quadcurv.compare import compare
+        """Mean curvature by several schemes; see :func:`quadcurv.comparison.compare`."""
+        from quadcurv.comparison import compare
 
         return compare(self._mesh(wrap), schemes, exact, **options)
 
     def _mesh(self, wrap: Wrap) -> Mesh:
         if self._is_grid:
-            return QuadGrid.from_pyvista(self._dataset, wrap)
+            return libraries.from_structured(self._dataset, wrap)
         if tuple(wrap) != OPEN:
             raise TypeError("wrap: only a StructuredGrid has directions to wrap")
-        return QuadMesh.from_pyvista(self._dataset)
+        return libraries.from_pyvista(self._dataset)
 
     def _by_point(self, values: Floats) -> Floats:
-        return interop.in_vtk_order(values, self._dataset) if self._is_grid else values
+        return libraries.in_vtk_order(values, self._dataset) if self._is_grid else values
 
 
 def _register() -> None:

@@ -14,12 +14,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from quadcurv import fields
-from quadcurv.compare import Comparison
+from quadcurv.comparison import Comparison
 from quadcurv.curvature import vertex_normals
-from quadcurv.fields import NAN_COLOUR, OVERLAYS, ZERO_COLOUR
-from quadcurv.mesh import Floats, Ints
-from quadcurv.page import save_page
+from quadcurv.types import Floats, Ints
+from quadcurv.viewing import fields
+from quadcurv.viewing.fields import NAN_COLOUR, OVERLAYS, ZERO_COLOUR
+from quadcurv.viewing.page import save_page
 
 if TYPE_CHECKING:
     import pyvista as pv
@@ -72,7 +72,7 @@ def save_maps(comparison: Comparison, path: str | Path, field: str = "error") ->
         ``.png`` for a picture, which needs a usable OpenGL; ``.html`` for a page with linked views that
         needs none and no network.
     field : str
-        One of :func:`quadcurv.fields.names`.
+        One of :func:`quadcurv.viewing.fields.names`.
 
     Raises
     ------
@@ -108,7 +108,7 @@ def maps(comparison: Comparison, field: str = "error") -> pv.Plotter:
     ----------
     comparison : Comparison
     field : str
-        One of :func:`quadcurv.fields.names`.
+        One of :func:`quadcurv.viewing.fields.names`.
 
     Returns
     -------
@@ -160,7 +160,7 @@ class View:
     ----------
     comparison : Comparison
     field : str
-        One of :func:`quadcurv.fields.names`.
+        One of :func:`quadcurv.viewing.fields.names`.
     off_screen : bool
         Whether the scene is for a file rather than a window; it then has no controls.
     refined : callable, optional

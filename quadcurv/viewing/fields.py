@@ -11,11 +11,12 @@ from math import ceil, floor, log10
 import numpy as np
 from scipy.spatial import cKDTree
 
-from quadcurv.compare import Comparison
+from quadcurv.comparison import Comparison
 from quadcurv.curvature import principal_curvatures
-from quadcurv.mesh import Floats, Ints, Mesh, MeshError, QuadGrid, StaggeredGrid
+from quadcurv.mesh import Mesh, QuadGrid, StaggeredGrid
 from quadcurv.quality import quality
 from quadcurv.schemes import Curvatures
+from quadcurv.types import Floats, Ints, MeshError
 
 NAN_COLOUR, ZERO_COLOUR = "#b0b0b0", "#f7cbdc"
 OVERLAYS = {"boundary": "#000000", "seam": "#e69f00", "valence < 4": "#56b4e9", "valence > 4": "#d55e00"}

@@ -15,7 +15,8 @@ import scipy
 from numpy.typing import ArrayLike, NDArray
 from scipy.spatial import cKDTree
 
-from quadcurv.mesh import QuadGrid, QuadMesh, StaggeredGrid, grid_faces
+from quadcurv.mesh import QuadGrid, QuadMesh, StaggeredGrid
+from quadcurv.stencils import grid_faces
 
 __all__ = [
     "SURFACES",

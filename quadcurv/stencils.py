@@ -1,0 +1,168 @@
+"""The one-ring stencils that every scheme reads."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, NamedTuple
+
+import numpy as np
+import scipy
+from numpy.typing import NDArray
+
+from quadcurv.types import Bools, Floats, Ints
+
+
+class CornerTable(NamedTuple):
+    """One-ring stencils: the corners (c, a, d, b) around every vertex, in CSR form.
+
+    Corners ``indptr[c]:indptr[c + 1]`` are those of vertex c, counter-clockwise; at a boundary vertex
+    they begin at the boundary edge. Faces that run against their neighbours are turned.
+
+    Attributes
+    ----------
+    indptr : (n + 1,) int64
+    centre : (k,) int32
+        The vertex c itself.
+    next : (k,) int32
+        The next edge neighbour a.
+    diagonal : (k,) int32
+        The vertex d across the quad, -1 in a triangle.
+    previous : (k,) int32
+        The previous edge neighbour b; in a closed ring it is the next corner's a.
+    """
+
+    indptr: NDArray[np.int64]
+    centre: Ints
+    next: Ints
+    diagonal: Ints
+    previous: Ints
+
+
+class Frame(NamedTuple):
+    """What surrounds a grid of points: ghosts, or the other side where it wraps.
+
+    Attributes
+    ----------
+    beyond : (6 c,) float64
+        The rows before the first and after the last one.
+    across : (k,) float64
+        The point before the first one of a row is x_0 + sum of across_k (x_k - x_0), that after the last
+        one alike; empty where rows are closed.
+    """
+
+    beyond: Floats
+    across: Floats
+
+
+@dataclass(frozen=True, eq=False)
+class Stencils:
+    """What a scheme reads: faces over points, and which of the points want a curvature.
+
+    Attributes
+    ----------
+    points : (p, 3) float64
+        Positions: first the n vertices with a stencil, then ghosts and dual points.
+    faces : (m, 4) int32
+        Counter-clockwise faces over `points`; a triangle's last entry is -1.
+    shape : tuple of int
+        Shape of a result, (n,) or (r, c) with r c = n.
+    closed : (n,) bool
+        Whether the ring is one closed fan; elsewhere no curvature is known.
+    orientable : bool
+        False where no choice of sides agrees; normals then have an arbitrary sign.
+    """
+
+    points: Floats
+    faces: Ints
+    shape: tuple[int, ...]
+    closed: Bools
+    orientable: bool = True
+
+    @property
+    def n(self) -> int:
+        """Number of vertices with a stencil."""
+        return int(np.prod(self.shape))
+
+    @property
+    def has_triangles(self) -> bool:
+        """Whether any face is a triangle."""
+        return bool((self.faces[:, 3] < 0).any())
+
+    @property
+    def valence(self) -> Ints:
+        """(n,) int32: number of faces at each vertex."""
+        count = np.bincount(self.faces[self.faces >= 0], minlength=len(self.points))
+        return count[: self.n].astype(np.int32)
+
+    @cached_property
+    def ring(self) -> Ints:
+        """(p, 8) int32: (a, d, a, d, ...) around each regular vertex inside, first -1 for all others."""
+        from quadcurv.kernels import topology
+
+        return topology.rings(self.faces, len(self.points))
+
+    @cached_property
+    def irregular(self) -> NDArray[np.int64]:
+        """Vertices with a stencil that have no such ring."""
+        return np.flatnonzero(self.ring[: self.n, 0] < 0)
+
+    @cached_property
+    def ring_areas(self) -> Floats:
+        """(n, 3) float64: half the vector area of each ring polygon; it points along the normal."""
+        from quadcurv.kernels import diamond
+
+        if self.orientable:
+            normal = np.zeros_like(self.points)
+            diamond.ring_normals(self.points, self.faces, normal)
+            normal = normal[: self.n]
+        else:  # faces disagree somewhere: the corner table has each ring turned one way
+            indptr, c, a, _, b = self.corner_table
+            corner = np.cross(self.points[a] - self.points[c], self.points[b] - self.points[c])
+            sums = scipy.sparse.csr_array((np.full(c.size, 0.25), np.arange(c.size), indptr))
+            normal = sums @ corner
+        # A length that is lost to underflow gives no direction.
+        normal[np.einsum("ix,ix->i", normal, normal) < np.finfo(float).tiny] = 0
+        return normal
+
+    @cached_property
+    def corner_table(self) -> CornerTable:
+        """Corners of the n vertices, ring by ring."""
+        from quadcurv.kernels import topology
+
+        indptr, corners = topology.corners_by_vertex(self.faces, len(self.points))
+        _, flipped, *_ = topology.order_rings(self.faces, indptr, corners, np.arange(self.n))
+        indptr = indptr[: self.n + 1]
+        face, slot = np.divmod(corners[: indptr[-1]], 4)
+        quad = self.faces[face, 3] >= 0
+        sides = np.where(quad, 4, 3)
+        turn = np.where(flipped[: indptr[-1]], -1, 1)
+
+        def vertex(step: Any) -> Ints:
+            return self.faces[face, (slot + step) % sides]
+
+        return CornerTable(
+            indptr,
+            vertex(0),
+            vertex(turn),
+            np.where(quad, vertex(2), np.int32(-1)),
+            vertex(-turn),
+        )
+
+
+def grid_faces(index: Ints) -> Ints:
+    """Quads of a grid of vertex indices, counter-clockwise about first times second direction."""
+    quads = np.stack((index[:-1, :-1], index[1:, :-1], index[1:, 1:], index[:-1, 1:]), axis=-1)
+    return quads.reshape(-1, 4)
+
+
+def face_pairs(faces: Ints) -> tuple[NDArray[np.int64], ...]:
+    """Faces f, g on the two sides of every interior edge, and the slots i, j at which it begins there."""
+    sides = np.where(faces[:, 3] < 0, 3, 4)
+    face, slot = np.nonzero(np.arange(4) < sides[:, None])
+    start, end = faces[face, slot], faces[face, (slot + 1) % sides[face]]
+    low, high = np.minimum(start, end), np.maximum(start, end)
+    order = np.lexsort((high, low))
+    pair = np.flatnonzero((np.diff(low[order]) == 0) & (np.diff(high[order]) == 0))
+    one, other = order[pair], order[pair + 1]
+    return face[one], slot[one], face[other], slot[other]
