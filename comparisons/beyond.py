@@ -77,7 +77,7 @@ def border_errors(surface: Surface, n: int, degree: int | None) -> tuple[float, 
     grid, xi, eta = surface.sample((n, n))
     assert isinstance(grid, QuadGrid)
     stencils = bordered(grid, degree)
-    flux, area = FINITE_VOLUME.apply(stencils)
+    flux, area = FINITE_VOLUME.flux(stencils)
     normal = stencils.ring_areas / np.linalg.norm(stencils.ring_areas, axis=1, keepdims=True)
     H = -np.einsum("ix,ix->i", flux, normal) / (2 * area)
     e = np.abs(H - surface.mean_curvature(xi, eta).ravel())
@@ -305,7 +305,7 @@ def valence_areas(output: Path) -> Results:
     save_figure(fig, output, "beyond_valence_8", table)
     for valence in (4, 8):
         stencils = cylinder().sample((64, 64))[0].stencils()
-        third, dual = (cotan(valence, area).apply(stencils)[1] for area in ("barycentric", "voronoi"))
+        third, dual = (cotan(valence, area).flux(stencils)[1] for area in ("barycentric", "voronoi"))
         results[f"areas: barycentric over Voronoi, valence {valence}"] = float(
             (third / dual)[stencils.closed].mean()
         )

@@ -158,7 +158,7 @@ def fluxes_differ(n: int = 24) -> float:
     mesh, *_ = surfaces.torus().sample((n, n))
     noise = np.random.default_rng(0).normal(0, 0.02, mesh.points.shape)
     stencils = type(mesh)(mesh.points + noise, mesh.wrap).stencils()
-    fv, liu = (scheme.apply(stencils)[0] for scheme in (FINITE_VOLUME, LIU))
+    fv, liu = (scheme.flux(stencils)[0] for scheme in (FINITE_VOLUME, LIU))
     return float(np.abs(fv - liu).max() / np.abs(liu).max())
 
 

@@ -1,19 +1,102 @@
-"""What is refused of a mesh, and how it is said: which argument, where first, how often."""
+"""What is refused of a mesh, what is mended, and how it is said: what, where first, how often."""
 
 from __future__ import annotations
 
 import operator
-from collections.abc import Sequence
-from typing import Any
+from collections.abc import Iterable, Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
-import scipy
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from quadcurv.stencils import face_pairs
-from quadcurv.types import Bools, Floats, Ints, MeshError
+from quadcurv.stencils import Polygons
+from quadcurv.types import Bools, Floats, Indices, Ints, MeshError
 
 _LARGEST = 1e70
+_FINDINGS = {
+    "collapsed": "face(s) with a repeated vertex, taken without the repetition",
+    "dropped": "face(s) of fewer than three distinct vertices, left out",
+    "double": "face(s) given twice, taken once",
+    "turned": "face(s) turned to agree with their neighbours",
+    "masked": "point(s) without a position, taken as holes",
+    "nonmanifold": "edge(s) with more than two faces, whose ends have no curvature",
+    "fans": "vertices where several fans touch, which have no curvature",
+    "isolated": "vertices without a face, which have no curvature",
+    "cut": "polygon(s) of more than four sides, cut into triangles for schemes of quads",
+    "inside_out": "closed surface whose normals point inward",
+    "non_orientable": "non-orientable mesh, whose mean curvature has no sign: |H| is given",
+}
+_WARNED = ("collapsed", "dropped", "double", "turned", "masked", "nonmanifold", "non_orientable")
+
+
+class Finding(NamedTuple):
+    """Something found in a mesh that was mended, or that has no answer: what, how often, where first."""
+
+    kind: str
+    count: int
+    first: str
+
+    def __str__(self) -> str:
+        where = f", first {self.first}" if self.first else ""
+        return f"{self.count} {_FINDINGS[self.kind]}{where}"
+
+
+class Report:
+    """What was mended in a mesh, and what has no answer there.
+
+    ``report["turned"]`` is a count, 0 where there is nothing of the kind; ``str(report)`` is one line.
+
+    Attributes
+    ----------
+    findings : tuple of Finding
+        Of the kinds "collapsed", "dropped", "double", "turned" and "masked", which were mended;
+        "nonmanifold", "fans" and "isolated", whose vertices are NaN; "cut", "inside_out" and
+        "non_orientable".
+    """
+
+    def __init__(self, findings: Iterable[Finding]) -> None:
+        self.findings = tuple(findings)
+
+    def __getitem__(self, kind: str) -> int:
+        if kind not in _FINDINGS:
+            raise KeyError(f"kind: expected one of {', '.join(_FINDINGS)}, got {kind!r}")
+        return sum(f.count for f in self.findings if f.kind == kind)
+
+    def __bool__(self) -> bool:
+        return bool(self.findings)
+
+    def __str__(self) -> str:
+        return "; ".join(map(str, self.findings)) or "nothing mended"
+
+    def __repr__(self) -> str:
+        return f"Report({self})"
+
+    @property
+    def warning(self) -> str:
+        """What the caller should hear of without asking, in one line; empty if there is nothing."""
+        return "; ".join(str(f) for f in self.findings if f.kind in _WARNED)
+
+
+class GivenFaces(NamedTuple):
+    """Faces as given, indices checked and repetitions taken out.
+
+    Attributes
+    ----------
+    table : (m, 4) int32
+        Triangles, -1 behind them, and quads.
+    source : (m,) int64 or None
+        The given face that each is; None: itself.
+    large : Polygons or None
+        Those of more than four sides.
+    large_source : (k,) int64
+    findings : list of Finding
+    """
+
+    table: Ints
+    source: Indices | None
+    large: Polygons | None
+    large_source: Indices
+    findings: list[Finding]
 
 
 def _first_and_count(bad: Any) -> tuple[int, int]:
@@ -26,6 +109,8 @@ def checked_points(points: ArrayLike, name: str, shape: tuple[Any, ...]) -> Floa
         given = np.asarray(points)
     except (ValueError, OverflowError):  # rows of different lengths, integers beyond all floats
         given = np.empty(0, object)
+    if hasattr(points, "__dask_graph__") or hasattr(points, "__cuda_array_interface__"):
+        raise MeshError(f"{name}: a lazy or device array ({type(points).__name__}), expected one in memory")
     if np.ma.is_masked(points):
         raise MeshError(f"{name}: masked entries, expected a number in each")
     if given.dtype.kind not in "fiu":
@@ -58,6 +143,12 @@ def checked_points(points: ArrayLike, name: str, shape: tuple[Any, ...]) -> Floa
     return array
 
 
+def unit_roundoff(points: ArrayLike) -> float:
+    """Relative rounding error of positions as they are given; integers have that of doubles."""
+    dtype = getattr(points, "dtype", np.dtype(float))
+    return float(np.finfo(dtype if dtype.kind == "f" else float).eps) / 2
+
+
 def _extremes(array: Floats) -> tuple[float, float]:
     """Least and largest entry, both NaN if any entry is; 0 of an empty array."""
     from quadcurv.kernels import ranges
@@ -76,6 +167,58 @@ def _extremes(array: Floats) -> tuple[float, float]:
     return low.min(), high.max()
 
 
+def masked_points(points: Any, mask: ArrayLike | None) -> tuple[Floats, Bools | None, list[Finding]]:
+    """Points of a grid, NaN where masked; the mask if it hides any; what is NaN without being masked."""
+    given = np.ma.getdata(points) if isinstance(points, np.ma.MaskedArray) else points
+    hidden = _hidden(points, mask)
+    findings: list[Finding] = []
+    if hidden is None:
+        try:
+            return checked_points(given, "points", ("r", "c", 3)), None, findings
+        except MeshError:
+            nan = _without_position(given)
+            if nan is None:
+                raise
+            hidden = np.zeros(nan.shape, bool)
+    else:
+        nan = _without_position(given)
+    if nan is not None:
+        unexpected = nan & ~hidden
+        if unexpected.any():
+            first = tuple(map(int, np.argwhere(unexpected)[0]))
+            findings.append(Finding("masked", int(np.count_nonzero(unexpected)), f"vertex {first}"))
+        hidden = hidden | nan
+    if hidden.all():
+        raise MeshError(f"mask: all {hidden.size} points are masked")
+    # What is hidden must not be looked at: a known point stands there until all are checked.
+    filled = np.array(given, np.float64)
+    filled[hidden] = filled[tuple(np.argwhere(~hidden)[0])]
+    filled = np.array(checked_points(filled, "points", ("r", "c", 3)))
+    filled[hidden] = np.nan
+    filled.flags.writeable = hidden.flags.writeable = False
+    return filled, hidden, findings
+
+
+def _hidden(points: Any, mask: ArrayLike | None) -> Bools | None:
+    """(r, c) what a mask or a masked array hides, None if neither is there or hides anything."""
+    hidden = np.ma.getmaskarray(points).any(axis=-1) if np.ma.is_masked(points) else None
+    if mask is not None:
+        given, shape = np.asarray(mask), np.shape(points)[:-1]
+        if given.dtype != bool or given.shape != shape:
+            raise MeshError(f"mask: expected booleans of shape {shape}, got {given.dtype} of {given.shape}")
+        hidden = given | hidden if hidden is not None else given.copy()
+    return hidden if hidden is not None and hidden.any() else None
+
+
+def _without_position(points: Any) -> Bools | None:
+    """(r, c) where a coordinate is NaN; None of what is no grid of floats or has no such point."""
+    array = np.asarray(points)
+    if array.ndim != 3 or array.shape[2] != 3 or array.dtype.kind != "f":
+        return None
+    nan = np.isnan(array).any(axis=2)
+    return nan if nan.any() else None
+
+
 def checked_wrap(wrap: Sequence[bool]) -> tuple[bool, bool]:
     """Two booleans."""
     given = list(wrap) if np.iterable(wrap) else []
@@ -84,118 +227,126 @@ def checked_wrap(wrap: Sequence[bool]) -> tuple[bool, bool]:
     return bool(given[0]), bool(given[1])
 
 
-def checked_faces(faces: Any, points: Floats) -> tuple[Ints, NDArray[np.int64] | None, int]:
-    """Faces as (m, 4) int32, the given face each stems from (None: itself), and how many were split."""
+def checked_faces(faces: Any, n: int) -> GivenFaces:
+    """Faces over n vertices as arrays.
+
+    Raises
+    ------
+    MeshError
+        A ValueError: no faces or points, wrong types or shapes, indices out of range, with the first face.
+    """
     from quadcurv.kernels import topology
 
-    if len(points) == 0:
+    if n == 0:
         raise MeshError("points: none given")
+    if n > np.iinfo(np.int32).max // 4:
+        raise MeshError(f"points: {n} are more than 32-bit indices can number")
+    if np.ma.is_masked(faces):
+        raise MeshError("faces: masked entries, expected an index in each")
     try:
         given = np.asarray(faces)
     except ValueError:  # polygons of different lengths
         given = np.empty(0, object)
-    if np.ma.is_masked(faces):
-        raise MeshError("faces: masked entries, expected an index in each")
-    if given.ndim == 2 and given.shape[1] in (3, 4) and given.dtype.kind in "iu":
+    if given.ndim == 2 and given.shape[1] in (3, 4):
+        if given.dtype.kind not in "iu":
+            raise MeshError(f"faces: expected integer indices, got dtype {given.dtype}")
         if given.dtype == np.uint64:  # the largest must not come out as -1
             given = np.minimum(given, np.uint64(np.iinfo(np.int64).max))
         table = np.ascontiguousarray(given, np.int32 if given.dtype == np.int32 else np.int64).view()
-        source, n_split = None, 0
-    elif given.ndim == 2 and given.shape[1] in (3, 4):
-        raise MeshError(f"faces: expected integer indices, got dtype {given.dtype}")
+        table.flags.writeable = False  # of one type for the compiler, whatever the caller's is
+        found = _from_table(table, n, topology.checked)
     else:
-        table, source, n_split = _from_polygons(faces, points)
-    if len(table) == 0:
-        raise MeshError("faces: none given")
-    n = len(points)
-    if n > np.iinfo(np.int32).max // 4:
-        raise MeshError(f"points: {n} are more than 32-bit indices can number")
-    table.flags.writeable = False  # of one type for the compiler, whatever the caller's is
-    checked = np.empty((len(table), 4), np.int32)
-    (outside, n_outside), (repeated, n_repeated) = topology.checked(table, n, checked)
+        found = _from_polygons(faces, n)
+    if len(found.table) == 0 and found.large is None:
+        left = f" is left of those given: {found.findings[0]}" if found.findings else " given"
+        raise MeshError(f"faces: none{left}")
+    return found
 
-    def given_face(face: int) -> int:
-        return face if source is None else int(source[face])
 
+def _from_table(table: Any, n: int, checked: Any) -> GivenFaces:
+    faces = np.empty((len(table), 4), np.int32)
+    (outside, n_outside), (_, n_repeated) = checked(table, n, faces)
     if n_outside:
         raise MeshError(
             f"faces: {n_outside} face(s) with an index outside 0..{n - 1}, "
-            f"first face {given_face(outside)}: {_padded(table[outside])}"
+            f"first face {outside}: {[*table[outside].tolist(), -1][:4]}"
         )
-    if n_repeated:
-        raise MeshError(
-            f"faces: {n_repeated} face(s) with a repeated vertex, "
-            f"first face {given_face(repeated)}: {_padded(table[repeated])}"
-        )
-    return checked, source, n_split
+    none = np.empty(0, np.int64)
+    if not n_repeated:
+        return GivenFaces(faces, None, None, none, [])
+    a, b, c, d = faces.T
+    repeated = (a == b) | (b == c) | (c == a) | ((d >= 0) & ((d == a) | (d == b) | (d == c)))
+    kept, mended = np.ones(len(faces), bool), np.flatnonzero(repeated)
+    for f in mended.tolist():
+        face = without_repetition([v for v in faces[f].tolist() if v >= 0])
+        kept[f] = len(face) >= 3
+        faces[f] = [*face, -1, -1, -1][:4]
+    return GivenFaces(faces[kept], np.flatnonzero(kept), None, none, _mended(mended[kept[mended]], ~kept))
 
 
-def _padded(face: Any) -> list[int]:
-    return [*face.tolist(), -1][:4]
-
-
-def _from_polygons(faces: Any, points: Floats) -> tuple[NDArray[np.int64], NDArray[np.int64], int]:
-    """Triangles and quads as they are, larger polygons by ear clipping across their vector area."""
-    import mapbox_earcut
-
-    rows: list[list[int]] = []
-    source: list[int] = []
-    n_split = 0
+def _from_polygons(faces: Any, n: int) -> GivenFaces:
     try:
         polygons = [[operator.index(v) for v in face] for face in faces]
     except TypeError:
         raise MeshError(
             "faces: expected an integer array of shape (m, 3) or (m, 4), or a sequence of polygons"
         ) from None
+    rows: list[list[int]] = []
+    source: list[int] = []
+    large: list[list[int]] = []
+    large_source: list[int] = []
+    collapsed, dropped = [], np.zeros(len(polygons), bool)
     for i, polygon in enumerate(polygons):
+        if len(polygon) == 4 and polygon[3] == -1:
+            polygon = polygon[:3]
         if len(polygon) < 3:
             raise MeshError(f"faces: a face has at least 3 vertices, face {i} has {len(polygon)}")
-        if min(polygon) < (-1 if len(polygon) == 4 else 0) or max(polygon) >= len(points):
-            raise MeshError(f"faces: face {i} has an index outside 0..{len(points) - 1}: {polygon}")
-        pieces = [polygon]
+        if min(polygon) < 0 or max(polygon) >= n:
+            raise MeshError(f"faces: face {i} has an index outside 0..{n - 1}: {polygon}")
+        if len(set(polygon)) < len(polygon):
+            face = without_repetition(polygon)
+            if len(face) < 3:
+                dropped[i] = True
+                continue
+            if len(face) < len(polygon):
+                collapsed.append(i)
+            polygon = face
         if len(polygon) > 4:
-            if len(set(polygon)) < len(polygon):
-                raise MeshError(f"faces: face {i} has a repeated vertex: {polygon}")
-            corners = points[polygon] - points[polygon[0]]
-            normal = np.cross(corners, np.roll(corners, -1, axis=0)).sum(axis=0)
-            # The plane across the normal: the right singular vectors of a row begin with the row.
-            _, _, (along, *plane) = np.linalg.svd(normal[None])
-            if np.linalg.det([along, *plane]) * np.dot(along, normal) < 0:
-                plane.reverse()
-            flat = np.ascontiguousarray(corners @ np.transpose(plane))
-            ears = mapbox_earcut.triangulate_float64(flat, np.array([len(polygon)], np.uint32))
-            if len(ears) != 3 * (len(polygon) - 2):  # it crosses itself, or vertices are in line
-                ears = np.array([(0, v, v + 1) for v in range(1, len(polygon) - 1)])
-            pieces = [[polygon[v] for v in ear] for ear in ears.reshape(-1, 3)]
-            n_split += 1
-        for piece in pieces:
-            rows.append(piece + [-1] * (4 - len(piece)))
+            large.append(polygon)
+            large_source.append(i)
+        else:
+            rows.append([*polygon, -1][:4])
             source.append(i)
-    table = np.array(rows, np.int64).reshape(-1, 4)
-    return table, np.array(source, np.int64), n_split
+    indptr = np.concatenate(([0], np.cumsum([len(p) for p in large], dtype=np.int64)))
+    corners = np.array([v for p in large for v in p], np.int32)
+    return GivenFaces(
+        np.array(rows, np.int32).reshape(-1, 4),
+        np.array(source, np.int64),
+        Polygons(indptr, corners, np.empty(0, np.int64)) if large else None,
+        np.array(large_source, np.int64),
+        _mended(np.array(collapsed, np.int64), dropped)
+        + ([Finding("cut", len(large), f"face {large_source[0]}")] if large else []),
+    )
 
 
-def consistent_sides(faces: Ints) -> tuple[Bools, bool]:
-    """Which faces to turn, as few as possible, so that neighbours agree; and whether all then do.
+def without_repetition(face: list[int]) -> list[int]:
+    """The face without vertices that follow themselves and without spikes, where it runs to and fro."""
+    k = 0
+    while len(face) >= 3 and k < len(face):
+        before, here, after = face[k - 1], face[k], face[(k + 1) % len(face)]
+        if here in (before, after) or before == after:
+            del face[k]
+            k = 0
+        else:
+            k += 1
+    return face
 
-    Non-orientable components are left as they are.
-    """
-    m = len(faces)
-    f, i, g, j = face_pairs(faces)
-    same_way = faces[f, i] == faces[g, j]
-    # Node f is face f as given, node f + m the same face turned; an edge joins what goes together.
-    rows = np.concatenate((f, f + m))
-    columns = np.concatenate((np.where(same_way, g + m, g), np.where(same_way, g, g + m)))
-    graph = scipy.sparse.coo_array((np.ones(rows.size, bool), (rows, columns)), shape=(2 * m, 2 * m))
-    label = scipy.sparse.csgraph.connected_components(graph, directed=False)[1]
-    orientable = not bool((label[:m] == label[m:]).any())
-    kept = np.bincount(label[:m], minlength=label.max() + 1)
-    turned = np.bincount(label[m:], minlength=label.max() + 1)
-    # A component and its mirror image differ in which faces they turn: keep the one that turns fewer.
-    ours, theirs = kept[label[:m]], turned[label[:m]]
-    first = np.full(label.max() + 1, m)
-    np.minimum.at(first, label[:m], np.arange(m))
-    mirror = np.empty(label.max() + 1, np.int64)
-    mirror[label[:m]] = label[m:]
-    tie = first[label[:m]] > first[mirror[label[:m]]]
-    return (ours < theirs) | ((ours == theirs) & tie), orientable
+
+def _mended(collapsed: Any, dropped: Any) -> list[Finding]:
+    found = []
+    if len(collapsed):
+        found.append(Finding("collapsed", len(collapsed), f"face {collapsed[0]}"))
+    if dropped.any():
+        first, count = _first_and_count(dropped)
+        found.append(Finding("dropped", count, f"face {first}"))
+    return found

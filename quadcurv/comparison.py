@@ -17,7 +17,7 @@ from rich.table import Table
 from quadcurv.curvature import dual_areas, mean_curvature
 from quadcurv.io import as_mesh
 from quadcurv.mesh import Mesh
-from quadcurv.schemes import SCHEMES, Fit, Scheme, as_scheme
+from quadcurv.schemes import SCHEMES, Scheme, as_scheme
 from quadcurv.tables import finite, progress, short, text_table, write_csv
 from quadcurv.types import Floats, Ints
 
@@ -208,7 +208,7 @@ class Comparison:
 
 def compare(
     mesh: Any,
-    schemes: str | Scheme | Fit | Iterable[str | Scheme | Fit] | None = None,
+    schemes: str | Scheme | Iterable[str | Scheme] | None = None,
     exact: ArrayLike | Callable[[Floats], ArrayLike] | None = None,
     boundary: str = "extrapolate",
 ) -> Comparison:
@@ -258,6 +258,6 @@ def compare(
     return Comparison(mesh, H, exact, dual_areas(mesh, "liu"), stencils.valence.reshape(stencils.shape))
 
 
-def schemes_of(schemes: str | Scheme | Fit | Iterable[str | Scheme | Fit]) -> list[Scheme | Fit]:
+def schemes_of(schemes: str | Scheme | Iterable[str | Scheme]) -> list[Scheme]:
     """Schemes by name, one or several."""
-    return [as_scheme(s) for s in ([schemes] if isinstance(schemes, str | Scheme | Fit) else schemes)]
+    return [as_scheme(s) for s in ([schemes] if isinstance(schemes, str | Scheme) else schemes)]

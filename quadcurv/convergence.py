@@ -13,7 +13,7 @@ from rich.console import Console
 from rich.table import Table
 
 from quadcurv.comparison import NORMS, compare, schemes_of
-from quadcurv.schemes import Fit, Scheme
+from quadcurv.schemes import Scheme
 from quadcurv.surfaces import Surface
 from quadcurv.tables import finite, progress, short, text_table, write_csv
 from quadcurv.types import Floats, Ints
@@ -212,7 +212,7 @@ class Convergence:
 
 def convergence(
     surface: Surface,
-    schemes: str | Scheme | Fit | Iterable[str | Scheme | Fit],
+    schemes: str | Scheme | Iterable[str | Scheme],
     shapes: Iterable[int | tuple[int, int]],
     layout: str = "staggered",
 ) -> Convergence:

@@ -8,19 +8,16 @@ from typing import Any
 import numpy as np
 import scipy
 
-from quadcurv.boundary import BOUNDARIES, frame, ghosts, with_ghosts
+from quadcurv import drivers
 from quadcurv.boundary import stencils as with_boundary
 from quadcurv.io import as_mesh
-from quadcurv.mesh import QuadGrid, QuadMesh, StaggeredGrid
-from quadcurv.schemes import Curvatures, Fit, Scheme, as_scheme
+from quadcurv.schemes import Curvatures, Fit, Laplacian, Scheme, as_scheme
 from quadcurv.schemes.angle_defect import angle_defect
-from quadcurv.schemes.diamond import without_infinity
-from quadcurv.stencils import Stencils
 from quadcurv.types import Floats
 
 
 def mean_curvature(
-    mesh: Any, scheme: str | Scheme | Fit = "finite_volume", boundary: str = "extrapolate"
+    mesh: Any, scheme: str | Scheme = "finite_volume", boundary: str = "extrapolate"
 ) -> Floats:
     """Mean curvature H = (k1 + k2) / 2 at every vertex.
 
@@ -57,7 +54,7 @@ def mean_curvature(
 
 
 def mean_curvature_normal(
-    mesh: Any, scheme: str | Scheme | Fit = "finite_volume", boundary: str = "extrapolate"
+    mesh: Any, scheme: str | Scheme = "finite_volume", boundary: str = "extrapolate"
 ) -> Floats:
     """Mean curvature normal H n, once the mean curvature (half the Laplace-Beltrami of the positions).
 
@@ -163,7 +160,7 @@ def vertex_normals(mesh: Any, boundary: str = "extrapolate") -> Floats:
     return evaluate(mesh, "vertex_normals", boundary=boundary)["vertex_normals"]
 
 
-def dual_areas(mesh: Any, scheme: str | Scheme | Fit = "finite_volume") -> Floats:
+def dual_areas(mesh: Any, scheme: str | Scheme = "finite_volume") -> Floats:
     """Area that a scheme gives to each vertex: the diagonal of its mass matrix.
 
     Parameters
@@ -187,7 +184,7 @@ def dual_areas(mesh: Any, scheme: str | Scheme | Fit = "finite_volume") -> Float
 
 
 def stiffness_matrix(
-    mesh: Any, scheme: str | Scheme | Fit = "finite_volume", out: scipy.sparse.csr_array | None = None
+    mesh: Any, scheme: str | Scheme = "finite_volume", out: scipy.sparse.csr_array | None = None
 ) -> scipy.sparse.csr_array:
     """Stiffness matrix S; the Laplace-Beltrami operator is -M^-1 S, and H n = -M^-1 S x / 2.
 
@@ -214,15 +211,10 @@ def stiffness_matrix(
     ValueError
         As for :func:`mean_curvature`; the scheme is a fit.
     """
-    scheme, stencils = _as_laplacian(scheme), as_mesh(mesh).stencils()
-    if scheme.stiffness is not None:
-        return scheme.stiffness(stencils, out)
-    if out is not None:
-        raise ValueError(f"out: {scheme.name} assembles a new matrix each time")
-    return without_infinity(scheme.assemble(stencils)[0])
+    return drivers.stiffness(as_mesh(mesh), _as_laplacian(scheme), out)
 
 
-def mass_matrix(mesh: Any, scheme: str | Scheme | Fit = "finite_volume") -> scipy.sparse.dia_array:
+def mass_matrix(mesh: Any, scheme: str | Scheme = "finite_volume") -> scipy.sparse.dia_array:
     """Diagonal mass matrix M of a scheme: its :func:`dual_areas`.
 
     Parameters
@@ -245,7 +237,7 @@ def mass_matrix(mesh: Any, scheme: str | Scheme | Fit = "finite_volume") -> scip
 def evaluate(
     mesh: Any,
     *wanted: str,
-    scheme: str | Scheme | Fit = "finite_volume",
+    scheme: str | Scheme = "finite_volume",
     boundary: str = "extrapolate",
     out: Mapping[str, Floats] | None = None,
 ) -> dict[str, Floats]:
@@ -270,115 +262,20 @@ def evaluate(
     ValueError
         As for the verbs; an unknown name; an array in `out` of another shape, type or layout.
     """
-    mesh, scheme = as_mesh(mesh), _as_laplacian(scheme)
-    if boundary not in BOUNDARIES:
-        raise ValueError(f"boundary: expected one of {BOUNDARIES}, got {boundary!r}")
-    shape = (len(mesh.points),) if isinstance(mesh, QuadMesh) else mesh.shape
-    results = {}
-    for name in dict.fromkeys((*wanted, *(out or ()))):
-        if name not in _PER_VERTEX:
-            raise ValueError(f"wanted: expected some of {', '.join(_PER_VERTEX)}, got {name!r}")
-        full = shape + _PER_VERTEX[name]
-        results[name] = array = np.empty(full) if out is None or name not in out else out[name]
-        flags = array.flags
-        if array.shape != full or array.dtype != np.float64 or not (flags.c_contiguous and flags.writeable):
-            raise ValueError(f"out: {name} wants a writeable C-contiguous float64 array of shape {full}")
-    if scheme.write is None:
-        _evaluate_stencils(mesh.stencils(), with_boundary(mesh, boundary), scheme, results)
-    elif isinstance(mesh, QuadMesh):
-        _evaluate_faces(mesh, scheme, boundary, results)
-    else:
-        _evaluate_grid(mesh, scheme, boundary, results)
-    return results
+    return drivers.run(as_mesh(mesh), _as_laplacian(scheme), wanted, boundary, out)
 
 
-_PER_VERTEX: dict[str, tuple[int, ...]] = {
-    "mean_curvature": (),
-    "mean_curvature_normal": (3,),
-    "vertex_normals": (3,),
-    "dual_areas": (),
-}
-
-
-def _evaluate_stencils(
-    given: Stencils, treated: Stencils, scheme: Scheme, results: dict[str, Floats]
-) -> None:
-    """From flux and area; the dual areas are those of the mesh as given."""
-    if "dual_areas" in results:
-        results["dual_areas"][...] = scheme.apply(given)[1].reshape(given.shape)
-    if "vertex_normals" in results:
-        results["vertex_normals"][...] = _normals(treated).reshape(*treated.shape, 3)
-    if results.keys() <= {"dual_areas", "vertex_normals"}:
-        return
-    Hn = _curvature_normal(treated, scheme)
-    if "mean_curvature_normal" in results:
-        results["mean_curvature_normal"][...] = Hn.reshape(*treated.shape, 3)
-    if "mean_curvature" in results:
-        H = -np.einsum("ix,ix->i", Hn, _normals(treated))
-        results["mean_curvature"][...] = (H if treated.orientable else np.abs(H)).reshape(treated.shape)
-
-
-def _evaluate_faces(mesh: QuadMesh, scheme: Scheme, boundary: str, results: dict[str, Floats]) -> None:
-    """Regular vertices in one pass, the others from the stencils of the part of the mesh around them."""
-    assert scheme.write is not None
-    scheme.write(mesh, None, results)
-    others, part = mesh.others()
-    if others.size:
-        inner = {name: np.empty(part.shape + _PER_VERTEX[name]) for name in results}
-        treated = part
-        if boundary == "extrapolate":
-            treated = with_ghosts(part, mesh.remember("ghosts", lambda: ghosts(part)))[0]
-        _evaluate_stencils(part, treated, scheme, inner)
-        for name, values in inner.items():
-            results[name][others] = values[: others.size]
-    if not mesh.orientable and "mean_curvature" in results:
-        np.abs(results["mean_curvature"], out=results["mean_curvature"])
-
-
-def _evaluate_grid(
-    grid: QuadGrid | StaggeredGrid, scheme: Scheme, boundary: str, results: dict[str, Floats]
-) -> None:
-    """All in one pass, save what is cut off at open sides: from the stencils of two rows along them."""
-    assert scheme.write is not None
-    scheme.write(grid, frame(grid, boundary), results)
-    cut = {"dual_areas"} if boundary == "extrapolate" else {"dual_areas", "vertex_normals"}
-    if not cut & results.keys() or (isinstance(grid, StaggeredGrid) and grid.has_ghosts):
-        return
-    for axis in (0, 1):
-        if grid.wrap[axis]:
-            continue
-        for end in (0, -1):
-            side = grid.side(axis, end)
-            inner = {name: np.empty(side.shape + _PER_VERTEX[name]) for name in cut & results.keys()}
-            _evaluate_stencils(side.stencils(), side.stencils(), scheme, inner)
-            for name, values in inner.items():
-                np.moveaxis(results[name], axis, 0)[end] = np.moveaxis(values, axis, 0)[end]
-
-
-def _as_laplacian(scheme: str | Scheme | Fit) -> Scheme:
+def _as_laplacian(scheme: str | Scheme) -> Laplacian:
     scheme = as_scheme(scheme)
     if isinstance(scheme, Fit):
         raise ValueError(f"scheme: {scheme.name} is a fit, which has no stiffness matrix and no dual areas")
     return scheme
 
 
-def _as_fit(scheme: str | Scheme | Fit) -> Fit:
+def _as_fit(scheme: str | Scheme) -> Fit:
     scheme = as_scheme(scheme)
-    if isinstance(scheme, Scheme):
+    if isinstance(scheme, Laplacian):
         raise ValueError(
             f"scheme: {scheme.name} gives the mean curvature alone; a fit is needed, such as 'jet'"
         )
     return scheme
-
-
-def _curvature_normal(stencils: Stencils, scheme: Scheme) -> Floats:
-    flux, area = scheme.apply(stencils)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        Hn = flux / (2 * area[:, None])
-    Hn[~stencils.closed | ~np.isfinite(Hn).all(axis=1)] = np.nan
-    return Hn
-
-
-def _normals(stencils: Stencils) -> Floats:
-    with np.errstate(divide="ignore", invalid="ignore"):
-        return stencils.ring_areas / np.linalg.norm(stencils.ring_areas, axis=1, keepdims=True)

@@ -9,14 +9,14 @@ import numpy as np
 from quadcurv.curvature import mean_curvature
 from quadcurv.io import as_mesh
 from quadcurv.mesh import QuadGrid
-from quadcurv.schemes import Fit, Scheme, as_scheme
+from quadcurv.schemes import Scheme, as_scheme
 from quadcurv.types import Floats
 
 
 def disagreement(
     mesh: Any,
-    scheme: str | Scheme | Fit = "finite_volume",
-    reference: str | Scheme | Fit = "jet",
+    scheme: str | Scheme = "finite_volume",
+    reference: str | Scheme = "jet",
     boundary: str = "extrapolate",
 ) -> Floats:
     """Estimate the error of a scheme by its difference to a better one.
@@ -48,7 +48,7 @@ def disagreement(
 
 def richardson(
     grid: QuadGrid,
-    scheme: str | Scheme | Fit = "finite_volume",
+    scheme: str | Scheme = "finite_volume",
     order: float | None = None,
     boundary: str = "extrapolate",
 ) -> Floats:

@@ -4,16 +4,19 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from quadcurv.checks import checked_faces, checked_points, checked_wrap, consistent_sides
+from quadcurv.checks import Finding, Report, checked_points, checked_wrap, masked_points, unit_roundoff
+from quadcurv.connectivity import Connectivity, connect
 from quadcurv.stencils import Stencils, grid_faces
-from quadcurv.types import Floats, Ints, MeshError
+from quadcurv.types import Bools, Floats, Indices, Ints, MeshError, MeshWarning
 
-_FAR = 100_000  # vertices between neighbours in memory, on average, from which on reordering pays
+_SEAM = 1e-9  # of the extent: nearer than that two rows are one
 
 
 class Recovery(NamedTuple):
@@ -31,6 +34,7 @@ class Recovery(NamedTuple):
     paired: float
 
 
+@dataclass(frozen=True, eq=False, init=False, repr=False)
 class QuadMesh:
     """Quads, or quads and triangles, over points.
 
@@ -42,56 +46,58 @@ class QuadMesh:
         stays.
     faces : (m, 4) or (m, 3) array_like of int, or sequence of polygons
         Vertex indices, counter-clockwise. In an (m, 4) array a last entry of -1 marks a triangle.
-        A polygon of more than four sides is split into triangles: by ear clipping, or as a fan where it
-        crosses itself seen along its vector area.
+        A polygon of more than four sides is kept for the schemes that are made for polygons, and cut into
+        triangles for the others, the worst of them as good as can be.
+    recovery : Recovery, optional
+        How the quads were found, where they come from triangles.
 
     Attributes
     ----------
     points : (n, 3) float64, read-only
-    faces : (m, 4) int32, read-only
-        The faces computed with; a triangle's last entry is -1.
-    face_source : (m,) int64
-        The index of the given face that each of `faces` stems from.
-    n_split : int
-        How many polygons of more than four sides were split.
-    n_flipped : int
-        How many faces were turned so that neighbours agree.
-    orientable : bool
-        False for a mesh such as a Moebius strip; its mean curvature is given without sign.
+    connectivity : Connectivity
+        What does not depend on the positions; meshes made by :meth:`with_points` share it.
     recovery : Recovery or None
-        How the quads were found, where they come from triangles.
+    roundoff : float
+        Relative rounding error of the positions as they were given, 2^-24 for float32.
 
     Raises
     ------
     MeshError
         A ValueError: wrong shapes or types, masked entries, non-finite points, coordinates beyond 1e70 or
-        all within 1e-70 of each other, indices out of range or repeated in a face, edges with more than
-        two faces.
+        all within 1e-70 of each other, indices out of range, no proper face.
 
     Warns
     -----
-    UserWarning
-        The mesh is non-orientable.
+    MeshWarning
+        Once, with what was mended and where: faces that repeat a vertex or another face, faces turned to
+        agree with their neighbours; edges of more than two faces; a mesh that cannot be oriented.
 
     Notes
     -----
-    Vertices without a face and vertices where several fans touch are accepted: their curvature is NaN.
+    Vertices without a face, vertices where several fans touch and the ends of edges of more than two faces
+    are accepted: their curvature is NaN. `report` counts all of these.
     """
 
     points: Floats
-    faces: Ints
-    n_split: int
-    n_flipped: int
-    orientable: bool
-    recovery: Recovery | None = None
+    connectivity: Connectivity
+    recovery: Recovery | None
+    roundoff: float
 
-    def __init__(self, points: ArrayLike, faces: ArrayLike | Sequence[Sequence[int]]) -> None:
-        self.points = checked_points(points, "points", ("n", 3))
-        self.faces, self._source, self.n_split = checked_faces(faces, self.points)
-        self.n_flipped, self.orientable = 0, True
-        self._shared: dict[str, Any] = {}
-        self._orient()
-        self.faces.flags.writeable = False
+    def __init__(
+        self,
+        points: ArrayLike,
+        faces: ArrayLike | Sequence[Sequence[int]],
+        *,
+        recovery: Recovery | None = None,
+    ) -> None:
+        checked = checked_points(points, "points", ("n", 3))
+        self.__dict__.update(
+            points=checked,
+            connectivity=connect(faces, checked),
+            recovery=recovery,
+            roundoff=unit_roundoff(points),
+        )
+        _warn(self.connectivity.findings)
 
     def __repr__(self) -> str:
         triangles = int(np.count_nonzero(self.faces[:, 3] < 0))
@@ -99,138 +105,156 @@ class QuadMesh:
         return f"QuadMesh({len(self.points)} points, {kinds})"
 
     @property
-    def face_source(self) -> NDArray[np.int64]:
+    def faces(self) -> Ints:
+        """(m, 4) int32, read-only: the faces computed with; a triangle's last entry is -1."""
+        return self.connectivity.faces
+
+    @property
+    def face_source(self) -> Indices:
         """(m,) int64: the index of the given face that each of `faces` stems from."""
-        return np.arange(len(self.faces)) if self._source is None else self._source
+        source = self.connectivity.source
+        return np.arange(len(self.faces)) if source is None else source
 
-    def _orient(self) -> None:
-        """Reject non-manifold edges; turn faces until neighbours agree, or find that they cannot."""
-        from quadcurv.kernels import topology
+    @property
+    def orientable(self) -> bool:
+        """False for a mesh such as a Moebius strip; its mean curvature is given without sign."""
+        return self.connectivity.orientable
 
-        ring, others, kind, bad_edge, n_disagree = topology.fans(self.faces, len(self.points))
-        if bad_edge[2]:
-            raise MeshError(
-                f"faces: {bad_edge[2]} edge(s) with more than two faces, "
-                f"first the one from vertex {bad_edge[0]} to {bad_edge[1]}"
-            )
-        if n_disagree:
-            turn, self.orientable = consistent_sides(self.faces)
-            self.n_flipped = int(np.count_nonzero(turn))
-            quad = self.faces[:, 3] >= 0
-            self.faces[turn & quad] = self.faces[turn & quad][:, [0, 3, 2, 1]]
-            self.faces[turn & ~quad] = self.faces[turn & ~quad][:, [0, 2, 1, 3]]
-            ring, others, kind, *_ = topology.fans(self.faces, len(self.points))
-            if not self.orientable:
-                warnings.warn(
-                    "the mesh is non-orientable: its mean curvature has no sign, |H| is given",
-                    stacklevel=3,
-                )
-        self._kind, self._ring, self._others = kind, ring, others
+    @cached_property
+    def report(self) -> Report:
+        """What was mended, and what has no answer; a closed mesh that is inside out is told of too."""
+        findings = self.connectivity.findings
+        if self.orientable and self.connectivity.closed.all() and _volume(self.points, self.faces) < 0:
+            findings += (Finding("inside_out", 1, ""),)
+        return Report(findings)
 
     def stencils(self) -> Stencils:
         """One-ring stencils of the vertices as they are; rings at a boundary stay open."""
-        from quadcurv.kernels import topology
-
-        closed = self._kind == topology.INTERIOR
-        stencils = Stencils(self.points, self.faces, (len(self.points),), closed, self.orientable)
-        stencils.__dict__.update(ring=self._ring, irregular=self._others)
+        c = self.connectivity
+        stencils = Stencils(self.points, c.faces, (len(self.points),), c.closed, c.orientable, c.polygons)
+        stencils.__dict__.update(ring=c.ring, irregular=c.irregular)
         return stencils
 
-    def remember(self, name: str, make: Callable[[], Any]) -> Any:
-        """Return what depends on the connectivity alone, made once for all meshes that share it."""
-        if name not in self._shared:
-            self._shared[name] = make()
-        return self._shared[name]
-
-    @property
-    def distance(self) -> float:
-        """Mean distance in memory of neighbours, in vertices."""
-        from quadcurv.kernels import topology
-
-        return float(self.remember("distance", lambda: topology.mean_distance(self.faces)))
-
-    def ring_order(self) -> tuple[tuple[Ints, Ints] | None, Ints]:
-        """Rings (n, 8) of the regular vertices inside, first -1 for all others; and an order of them.
-
-        The order is None for that of the vertices; else rings are in it, numbered by it, and it comes with
-        the place of every vertex in it. It pays on large meshes whose neighbours are far apart in memory,
-        and takes the time of several evaluations: it is made the second time that a connectivity is used.
-        """
-        from quadcurv.kernels import topology
-
-        shared = self._shared
-        given: tuple[tuple[Ints, Ints] | None, Ints] = None, self._ring
-        if "rings" not in shared and shared.setdefault("uses", 0) > 0:
-            found = given
-            if self.distance > _FAR:
-                order = topology.nearby_order(self._ring)
-                ring, place = topology.renumbered(self._ring, order)
-                found = (order, place), ring
-            shared["rings"] = found  # at once: other threads see both or neither
-        shared["uses"] = 1
-        return shared.get("rings", given)
-
-    def others(self) -> tuple[NDArray[np.int64], Stencils]:
-        """Vertices that are not regular or not inside, and the stencils of a part of the mesh around them.
+    def irregular_part(self) -> tuple[Indices, Stencils]:
+        """Vertices without a regular ring, and the stencils of a part of the mesh around them.
 
         The first vertices of the part are these; it reaches four faces beyond them, so that they have there
         all that a ghost layer or a scheme may look at.
         """
-        from quadcurv.kernels import topology
-
-        if self._others.size == 0:
-            return self._others, Stencils(self.points[:0], self.faces[:0], (0,), np.empty(0, bool))
-        vertices, faces = self.remember(
-            "part", lambda: topology.part_around(self.faces, self._others, len(self.points), 4)
+        c = self.connectivity
+        if c.irregular.size == 0:
+            return c.irregular, Stencils(self.points[:0], self.faces[:0], (0,), np.empty(0, bool))
+        vertices, faces = c.irregular_part
+        part = Stencils(
+            self.points[vertices], faces, (vertices.size,), c.closed[vertices], orientable=c.orientable
         )
-        closed = self._kind[vertices] == topology.INTERIOR
-        return self._others, Stencils(self.points[vertices], faces, (vertices.size,), closed, self.orientable)
+        return c.irregular, part
 
     def with_points(self, points: ArrayLike) -> QuadMesh:
         """Return the same faces, not checked again, over other positions of the same shape."""
+        checked = checked_points(points, "points", self.points.shape)
+        return self._like(points=checked, roundoff=unit_roundoff(points))
+
+    def reordered(self) -> QuadMesh:
+        """Return the same mesh with an order of its vertices in which neighbours are near in memory.
+
+        Results stay in the order of the vertices; FV and Liu are faster by it on large meshes whose
+        neighbours are far apart in memory. It takes the time of several evaluations, and pays where many
+        follow, as with :meth:`with_points`. Where it would not pay, nothing is done.
+        """
+        return self._like(connectivity=self.connectivity.reordered())
+
+    def arrays(self) -> dict[str, Floats]:
+        """Arrays of positions by name, which results must not overlap."""
+        return {"points": self.points}
+
+    def _like(self, **changed: Any) -> QuadMesh:
         mesh = object.__new__(QuadMesh)
-        mesh.__dict__.update(self.__dict__)
-        mesh.points = checked_points(points, "points", self.points.shape)
+        kept = {name: self.__dict__[name] for name in ("points", "connectivity", "recovery", "roundoff")}
+        mesh.__dict__.update(kept | changed)
         return mesh
 
 
+@dataclass(frozen=True, eq=False, init=False, repr=False)
 class QuadGrid:
     """A logically Cartesian grid of vertices.
 
     Parameters
     ----------
     points : (r, c, 3) array_like of float
-        Positions; the surface normal is that of the first direction times the second.
+        Positions; the surface normal is that of the first direction times the second. Grids of
+        ``numpy.meshgrid(x, y, indexing="ij")`` with z = f(x, y) have it along +z, those of
+        ``indexing="xy"``, where x runs along the second direction, along -z, and H of the other sign.
     wrap : (bool, bool)
         Whether the last row (column) is followed by the first, which is not repeated.
+    mask : (r, c) array_like of bool, optional
+        True where there is no point, as in numpy's masked arrays; so are points that `points` masks, or
+        whose coordinates are NaN. Holes are open sides: results are NaN in them, and beside them as at
+        every border.
+
+    Attributes
+    ----------
+    points : (r, c, 3) float64, read-only
+        NaN where masked.
+    wrap : (bool, bool)
+    mask : (r, c) bool or None
+    roundoff : float
+        Relative rounding error of the positions as they were given, 2^-24 for float32.
 
     Raises
     ------
     MeshError
-        A ValueError: wrong shape, fewer than 2 points a direction (3 where it wraps), non-finite points.
+        A ValueError: wrong shape, fewer than 2 points a direction (3 where it wraps), infinite points, a
+        wrap whose first row (column) is given twice, a mask that leaves no quad.
+
+    Warns
+    -----
+    MeshWarning
+        Points that are NaN without being masked.
     """
 
-    def __init__(self, points: ArrayLike, wrap: Sequence[bool] = (False, False)) -> None:
-        self.wrap = checked_wrap(wrap)
-        self.points = checked_points(points, "points", ("r", "c", 3))
+    points: Floats
+    wrap: tuple[bool, bool]
+    mask: Bools | None
+    roundoff: float
+
+    def __init__(
+        self, points: ArrayLike, wrap: Sequence[bool] = (False, False), mask: ArrayLike | None = None
+    ) -> None:
+        wraps = checked_wrap(wrap)
+        checked, hidden, unexpected = masked_points(points, mask)
+        self.__dict__.update(points=checked, wrap=wraps, mask=hidden, roundoff=unit_roundoff(points))
         for axis, name in enumerate(("rows", "columns")):
-            least = 3 if self.wrap[axis] else 2
-            if self.points.shape[axis] < least:
+            least = 3 if wraps[axis] else 2
+            if checked.shape[axis] < least:
                 raise MeshError(
-                    f"points: {self.points.shape[axis]} {name}, at least {least} are needed"
-                    + (" where the grid wraps" if self.wrap[axis] else "")
+                    f"points: {checked.shape[axis]} {name}, at least {least} are needed"
+                    + (" where the grid wraps" if wraps[axis] else "")
                 )
+            if wraps[axis]:
+                _refuse_repetition(checked, axis, name)
+        self.__dict__["report"] = Report(unexpected)
+        _warn(unexpected)
 
     def __repr__(self) -> str:
-        return f"QuadGrid({self.shape[0]} x {self.shape[1]} points, wrap={self.wrap})"
+        masked = f", {np.count_nonzero(self.mask)} masked" if self.mask is not None else ""
+        return f"QuadGrid({self.shape[0]} x {self.shape[1]} points, wrap={self.wrap}{masked})"
 
     @property
     def shape(self) -> tuple[int, int]:
         """Rows and columns of vertices."""
         return self.points.shape[0], self.points.shape[1]
 
+    report: Report
+    """Points without a position, taken as holes."""
+
     def stencils(self) -> Stencils:
-        """One-ring stencils of the vertices as they are; rings at open sides stay open."""
+        """One-ring stencils of the vertices as they are; rings at open sides stay open.
+
+        Of a grid with a mask these are the stencils of :meth:`to_mesh`, in whose order they are.
+        """
+        if self.mask is not None:
+            return self.to_mesh().stencils()
         index = np.arange(self.shape[0] * self.shape[1], dtype=np.int32).reshape(self.shape)
         index = np.pad(index, [(0, int(w)) for w in self.wrap], mode="wrap")
         closed = np.ones(self.shape, bool)
@@ -240,6 +264,10 @@ class QuadGrid:
             closed[:, [0, -1]] = False
         return Stencils(self.points.reshape(-1, 3), grid_faces(index), self.shape, closed.ravel())
 
+    def arrays(self) -> dict[str, Floats]:
+        """Arrays of positions by name, which results must not overlap."""
+        return {"points": self.points}
+
     def side(self, axis: int, end: int) -> QuadGrid:
         """Return the two rows (axis 0) or columns (1) at the first (end 0) or last (-1) open side."""
         size = self.shape[axis]
@@ -247,11 +275,17 @@ class QuadGrid:
         return QuadGrid(self.points.take(kept, axis), [w and i != axis for i, w in enumerate(self.wrap)])
 
     def to_mesh(self) -> QuadMesh:
-        """Return the same quads as a face list, vertices in row-major order."""
-        stencils = self.stencils()
-        return QuadMesh(stencils.points, stencils.faces)
+        """Return the same quads as a face list, vertices in row-major order, masked ones left out."""
+        if self.mask is None:
+            stencils = self.stencils()
+            return QuadMesh(stencils.points, stencils.faces)
+        index = np.full(self.shape, -1, np.int32)
+        index[~self.mask] = np.arange(np.count_nonzero(~self.mask))
+        faces = grid_faces(np.pad(index, [(0, int(w)) for w in self.wrap], mode="wrap"))
+        return QuadMesh(self.points[~self.mask], faces[(faces >= 0).all(axis=1)])
 
 
+@dataclass(frozen=True, eq=False, init=False, repr=False)
 class StaggeredGrid:
     """A grid of primal points (cell centres) and dual points (cell corners), as finite-volume codes have.
 
@@ -274,11 +308,20 @@ class StaggeredGrid:
         A ValueError: wrong shapes, non-finite points, or a seam that does not meet.
     """
 
+    primal: Floats
+    dual: Floats
+    wrap: tuple[bool, bool]
+    shape: tuple[int, int]
+    roundoff: float
+
     def __init__(self, primal: ArrayLike, dual: ArrayLike, wrap: Sequence[bool] = (False, False)) -> None:
-        self.wrap = checked_wrap(wrap)
-        self.dual = checked_points(dual, "dual", ("r + 1", "c + 1", 3))
+        self.__dict__.update(
+            wrap=checked_wrap(wrap),
+            dual=checked_points(dual, "dual", ("r + 1", "c + 1", 3)),
+            roundoff=max(unit_roundoff(primal), unit_roundoff(dual)),
+        )
         r, c = (self.dual.shape[0] - 1, self.dual.shape[1] - 1)
-        self.primal = checked_points(primal, "primal", ("r", "c", 3))
+        self.__dict__.update(primal=checked_points(primal, "primal", ("r", "c", 3)), shape=(r, c))
         if r < 1 or c < 1 or self.primal.shape[:2] not in ((r, c), (r + 2, c + 2)):
             raise MeshError(
                 f"primal: shape {self.primal.shape} does not fit dual of shape {self.dual.shape}; "
@@ -288,18 +331,26 @@ class StaggeredGrid:
             raise MeshError("wrap: primal has ghost cells already, so no side is left to wrap")
         if self.primal.shape[:2] == (1, 1):
             raise MeshError("primal: a single cell needs ghost cells around it")
-        self.shape = r, c
         for axis, name in enumerate(("rows", "columns")):
             if not self.wrap[axis]:
                 continue
             if self.shape[axis] < 3:
                 raise MeshError(f"primal: {self.shape[axis]} {name}, at least 3 are needed to wrap")
             gap = np.abs(self.dual.take(0, axis) - self.dual.take(-1, axis)).max()
-            if gap > 1e-9 * np.ptp(self.dual.reshape(-1, 3), axis=0).max():
+            if gap > _SEAM * np.ptp(self.dual.reshape(-1, 3), axis=0).max():
                 raise MeshError(f"dual: first and last {name} differ by {gap:.3g} although they wrap")
 
     def __repr__(self) -> str:
         return f"StaggeredGrid({self.shape[0]} x {self.shape[1]} cells, wrap={self.wrap})"
+
+    @property
+    def report(self) -> Report:
+        """Nothing is ever mended in a staggered grid."""
+        return Report(())
+
+    def arrays(self) -> dict[str, Floats]:
+        """Arrays of positions by name, which results must not overlap."""
+        return {"primal": self.primal, "dual": self.dual}
 
     def side(self, axis: int, end: int) -> StaggeredGrid:
         """Return the two rows (axis 0) or columns (1) at the first (end 0) or last (-1) open side."""
@@ -395,3 +446,35 @@ class StaggeredGrid:
 
 
 Mesh = QuadMesh | QuadGrid | StaggeredGrid
+
+
+def _warn(findings: Sequence[Finding]) -> None:
+    """Say once what was mended, above the one who made the mesh."""
+    said = Report(findings).warning
+    if said:
+        warnings.warn(said, MeshWarning, stacklevel=3)
+
+
+def _volume(points: Floats, faces: Ints) -> float:
+    """Six times the signed volume that a closed mesh encloses."""
+    x = points - points[0]
+    a, b, c = (x[faces[:, k]] for k in range(3))
+    volume = np.einsum("ix,ix->", np.cross(a, b), c)
+    quad = faces[:, 3] >= 0
+    d = x[faces[quad, 3]]
+    return float(volume + np.einsum("ix,ix->", np.cross(a[quad], c[quad]), d))
+
+
+def _refuse_repetition(points: Floats, axis: int, name: str) -> None:
+    """The first row of a wrap that the last one repeats would make quads without area."""
+    with np.errstate(invalid="ignore"):
+        first, last, second = (points.take(k, axis) for k in (0, -1, 1))
+        gap, step = np.abs(first - last), np.abs(second - first)
+    if not np.isfinite(gap).any():
+        return
+    # Beside the next row, so that a grid of many rows far from the origin is not taken for one of these.
+    if np.nanmax(gap) <= _SEAM * max(np.nanmax(step), np.finfo(float).tiny):
+        raise MeshError(
+            f"wrap: the last of the {name} repeats the first one, which follows it where the grid wraps: "
+            f"leave it out, as points{'[:-1]' if axis == 0 else '[:, :-1]'} does"
+        )

@@ -44,7 +44,7 @@ class Accessor:
 
     def mean_curvature(
         self,
-        scheme: str | Scheme | Fit = "finite_volume",
+        scheme: str | Scheme = "finite_volume",
         boundary: str = "extrapolate",
         wrap: Wrap = OPEN,
     ) -> Floats:
@@ -53,7 +53,7 @@ class Accessor:
 
     def mean_curvature_normal(
         self,
-        scheme: str | Scheme | Fit = "finite_volume",
+        scheme: str | Scheme = "finite_volume",
         boundary: str = "extrapolate",
         wrap: Wrap = OPEN,
     ) -> Floats:

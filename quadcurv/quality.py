@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 from quadcurv.boundary import EXTRAPOLATED, INTERIOR, OPEN, boundary_treatment, roughness
 from quadcurv.curvature import mean_curvature
 from quadcurv.io import as_mesh
-from quadcurv.mesh import QuadMesh
 from quadcurv.schemes import SCHEMES
 from quadcurv.stencils import Stencils
 from quadcurv.types import Bools, Floats
@@ -97,8 +96,8 @@ def summary(mesh: Any, schemes: Iterable[str] | None = None, boundary: str = "ex
         "vertices": stencils.n,
         "quads": len(stencils.faces) - triangles,
         "triangles": triangles,
-        "polygons": mesh.n_split if isinstance(mesh, QuadMesh) else 0,
-        "turned": mesh.n_flipped if isinstance(mesh, QuadMesh) else 0,
+        "polygons": mesh.report["cut"],
+        "turned": mesh.report["turned"],
         "coincident": stencils.n - len(np.unique(stencils.points[: stencils.n] + 0.0, axis=0)),
         "valence": {k: int(count) for k, count in enumerate(np.bincount(stencils.valence)) if count},
         "boundary": {

@@ -10,7 +10,7 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-from quadcurv.types import Bools, Floats, Ints
+from quadcurv.types import Bools, Floats, Indices, Ints
 
 
 class CornerTable(NamedTuple):
@@ -37,6 +37,31 @@ class CornerTable(NamedTuple):
     next: Ints
     diagonal: Ints
     previous: Ints
+
+
+class Polygons(NamedTuple):
+    """Faces of more than four sides, which a face list has cut into triangles.
+
+    Attributes
+    ----------
+    indptr : (k + 1,) int64
+    corners : (c,) int32
+        Polygon f has the vertices ``corners[indptr[f]:indptr[f + 1]]``, counter-clockwise.
+    face : (m,) int64
+        The polygon that each of the faces is a piece of, -1 where it is a face by itself.
+    """
+
+    indptr: Indices
+    corners: Ints
+    face: Indices
+
+    def turned(self, turn: Bools) -> Polygons:
+        """The same, those polygons turned over whose pieces are."""
+        corners = self.corners.copy()
+        for f in np.unique(self.face[turn & (self.face >= 0)]).tolist():
+            begin, end = self.indptr[f], self.indptr[f + 1]
+            corners[begin + 1 : end] = corners[begin + 1 : end][::-1]
+        return self._replace(corners=corners)
 
 
 class Frame(NamedTuple):
@@ -71,6 +96,8 @@ class Stencils:
         Whether the ring is one closed fan; elsewhere no curvature is known.
     orientable : bool
         False where no choice of sides agrees; normals then have an arbitrary sign.
+    polygons : Polygons or None
+        Faces of more than four sides, which `faces` has cut: for schemes that are made for polygons.
     """
 
     points: Floats
@@ -78,6 +105,7 @@ class Stencils:
     shape: tuple[int, ...]
     closed: Bools
     orientable: bool = True
+    polygons: Polygons | None = None
 
     @property
     def n(self) -> int:
@@ -156,13 +184,45 @@ def grid_faces(index: Ints) -> Ints:
     return quads.reshape(-1, 4)
 
 
-def face_pairs(faces: Ints) -> tuple[NDArray[np.int64], ...]:
-    """Faces f, g on the two sides of every interior edge, and the slots i, j at which it begins there."""
+class Edges(NamedTuple):
+    """Edges of a face list by how many faces they have: those of one, of two, and of more.
+
+    Attributes
+    ----------
+    border : (b, 2) int64
+        Face and slot at which the edge begins.
+    pairs : (k, 4) int64
+        Faces f, g on the two sides, and the slots i, j at which the edge begins in each: (f, i, g, j).
+    shared_by_many : (e, 2) int32
+        Vertices of each edge of more than two faces.
+    """
+
+    border: Indices
+    pairs: Indices
+    shared_by_many: Ints
+
+
+def edges(faces: Ints) -> Edges:
+    """Sort the edges of a face list by their number of faces."""
     sides = np.where(faces[:, 3] < 0, 3, 4)
     face, slot = np.nonzero(np.arange(4) < sides[:, None])
     start, end = faces[face, slot], faces[face, (slot + 1) % sides[face]]
     low, high = np.minimum(start, end), np.maximum(start, end)
     order = np.lexsort((high, low))
-    pair = np.flatnonzero((np.diff(low[order]) == 0) & (np.diff(high[order]) == 0))
-    one, other = order[pair], order[pair + 1]
-    return face[one], slot[one], face[other], slot[other]
+    low, high = low[order], high[order]
+    new = np.concatenate(([True], (np.diff(low) != 0) | (np.diff(high) != 0)))
+    first = np.flatnonzero(new[: len(order)])
+    count = np.diff(np.append(first, len(order)))
+    one, two, many = (first[count == 1], first[count == 2], first[count > 2])
+    alone, left, right = order[one], order[two], order[two + 1]
+    return Edges(
+        np.stack((face[alone], slot[alone]), axis=1),
+        np.stack((face[left], slot[left], face[right], slot[right]), axis=1),
+        np.stack((low[many], high[many]), axis=1),
+    )
+
+
+def face_pairs(faces: Ints) -> tuple[Indices, ...]:
+    """Faces f, g on the two sides of every edge of two faces, and the slots i, j at which it begins there."""
+    f, i, g, j = edges(faces).pairs.T
+    return f, i, g, j

@@ -301,7 +301,7 @@ def test_nothing_of_the_callers_changes():
     faces[3] = faces[3][::-1]  # will be turned, in our copy
     before = points.copy(), faces.copy()
     mesh = QuadMesh(points, faces)
-    assert mesh.n_flipped == 1
+    assert mesh.report["turned"] == 1
     for scheme in SCHEMES:
         qc.mean_curvature((points, faces), scheme)
     quality(mesh), summary(mesh, ["liu"]), mesh.stencils().corner_table
@@ -463,7 +463,7 @@ def test_the_two_sides_of_one_quad_enclose_nothing(scheme):
     H = qc.mean_curvature((SQUARE[:4], [[0, 1, 2, 3], [0, 1, 2, 3]]), scheme)
     assert H.shape == (4,)
     assert not np.isinf(H).any()
-    assert QuadMesh(SQUARE[:4], [[0, 1, 2, 3], [0, 1, 2, 3]]).n_flipped == 1
+    assert QuadMesh(SQUARE[:4], [[0, 1, 2, 3], [0, 1, 2, 3]]).report["turned"] == 1
 
 
 def test_mixed_orientation_is_mended_by_the_fewest_turns(rng):
@@ -472,7 +472,7 @@ def test_mixed_orientation_is_mended_by_the_fewest_turns(rng):
     mixed = faces.copy()
     mixed[turned] = mixed[turned][:, [0, 3, 2, 1]]
     mesh = QuadMesh(points, mixed)
-    assert mesh.n_flipped == 20
+    assert mesh.report["turned"] == 20
     assert np.array_equal(mesh.faces, faces)
     assert np.array_equal(qc.mean_curvature(mesh), qc.mean_curvature((points, faces)))
 

@@ -115,7 +115,7 @@ def test_ply_of_single_precision_stays_single(tmp_path, form):
 @pytest.mark.parametrize(("suffix", "text"), [("obj", obj), ("off", off), ("ply", ply)])
 def test_polygons_are_kept_and_split_by_us(tmp_path, suffix, text):
     mesh = read(with_text(tmp_path / f"mesh.{suffix}", text(*PENTAGON)))
-    assert mesh.n_split == 1
+    assert mesh.report["cut"] == 1
     assert mesh.face_source.tolist() == [0, 0, 0, 1]
 
 

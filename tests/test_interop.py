@@ -145,7 +145,7 @@ def test_polygons_of_a_ply_file_come_back_through_trimesh(tmp_path):
     body = "".join(" ".join(map(str, p)) + "\n" for p in points) + "5 0 1 2 3 4\n4 0 4 5 1\n"
     (tmp_path / "a.ply").write_text(header + body)
     found = as_mesh(trimesh.load_mesh(tmp_path / "a.ply"))
-    assert found.n_split == 1
+    assert found.report["cut"] == 1
     assert found.recovery == Recovery("ply", 2 / 5)
 
 
@@ -270,7 +270,7 @@ def test_polydata_of_every_kind(mesh):
     regular = pv.PolyData.from_regular_faces(POINTS, np.array([[0, 1, 4, 3], [2, 6, 7, 5]]))
     assert as_mesh(regular).faces.tolist() == [[0, 1, 4, 3], [2, 6, 7, 5]]
     pentagon = pv.PolyData(POINTS, [5, 0, 1, 2, 5, 3])
-    assert as_mesh(pentagon).n_split == 1
+    assert as_mesh(pentagon).report["cut"] == 1
     single = qc.to_pyvista(mesh)
     single.points = single.points.astype(np.float32)
     np.testing.assert_array_equal(as_mesh(single).points, POINTS.astype(np.float32))

@@ -73,7 +73,7 @@ def test_polygons_are_split_counted_and_traced_to_their_source(sides):
     rim = np.stack((radius * np.cos(angle), radius * np.sin(angle), np.zeros(sides)), axis=1)
     points = np.vstack((rim, [(5, 0, 0), (6, 0, 0), (6, 1, 0)]))
     mesh = QuadMesh(points, [[sides, sides + 1, sides + 2], list(range(sides))])
-    assert mesh.n_split == 1
+    assert mesh.report["cut"] == 1
     assert mesh.face_source.tolist() == [0] + [1] * (sides - 2)
     normals = [np.cross(points[b] - points[a], points[c] - points[a]) / 2 for a, b, c in mesh.faces[1:, :3]]
     assert (np.array(normals)[:, 2] > 0).all()  # no ear is turned over
@@ -87,7 +87,7 @@ def test_faces_are_turned_to_agree_and_counted():
     faces = mesh.faces.copy()
     faces[turned] = faces[turned][:, [0, 3, 2, 1]]
     again = QuadMesh(mesh.points, faces)
-    assert again.n_flipped == 4
+    assert again.report["turned"] == 4
     assert np.array_equal(again.faces, mesh.faces)
     assert np.array_equal(faces[turned], mesh.faces[turned][:, [0, 3, 2, 1]])  # the caller's stay
     assert np.array_equal(mean_curvature(again), mean_curvature(mesh))
@@ -125,7 +125,7 @@ def test_two_half_twists_are_orientable():
     points, faces = moebius(turns=2)
     mesh = QuadMesh(points, faces)
     assert mesh.orientable
-    assert mesh.n_flipped == 0
+    assert mesh.report["turned"] == 0
 
 
 def test_meshes_are_frozen_views_that_change_nothing():

@@ -10,7 +10,7 @@ import numpy as np
 from quadcurv.kernels import ranges
 from quadcurv.kernels.compiled import helper, kernel, prefetch
 
-ISOLATED, INTERIOR, BOUNDARY, SEVERAL_FANS = 0, 1, 2, 3
+ISOLATED, INTERIOR, BOUNDARY, SEVERAL_FANS, NONMANIFOLD = 0, 1, 2, 3, 4
 FAR = 10_000  # vertices between neighbours in memory, on average, that are in no cache
 AHEAD = 16  # faces or vertices: where what is read next lies far apart, it is asked for that early
 PATCH = 65536  # vertices: one step of breadth-first order through them stays in the first-level cache

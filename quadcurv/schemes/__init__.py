@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from quadcurv.schemes.base import Curvatures, Fit, Scheme, StandardErrors
+from quadcurv.schemes.base import Curvatures, Diamond, Fit, Laplacian, Scheme, StandardErrors
 from quadcurv.schemes.cotan import cotan
 from quadcurv.schemes.finite_volume import FINITE_VOLUME
 from quadcurv.schemes.fundamental_forms import fundamental_forms
@@ -13,7 +13,9 @@ from quadcurv.schemes.polygon import alexa_wardetzky, bunge, de_goes
 __all__ = [
     "SCHEMES",
     "Curvatures",
+    "Diamond",
     "Fit",
+    "Laplacian",
     "Scheme",
     "StandardErrors",
     "alexa_wardetzky",
@@ -25,7 +27,7 @@ __all__ = [
     "jet",
 ]
 
-SCHEMES: dict[str, Scheme | Fit] = {
+SCHEMES: dict[str, Scheme] = {
     scheme.name: scheme
     for scheme in (
         FINITE_VOLUME,
@@ -46,7 +48,7 @@ SCHEMES: dict[str, Scheme | Fit] = {
 }
 
 
-def as_scheme(scheme: str | Scheme | Fit) -> Scheme | Fit:
+def as_scheme(scheme: str | Scheme) -> Scheme:
     """Return the scheme of that name, or the scheme itself.
 
     Raises
@@ -54,7 +56,7 @@ def as_scheme(scheme: str | Scheme | Fit) -> Scheme | Fit:
     ValueError
         The name is not in ``SCHEMES``.
     """
-    if isinstance(scheme, Scheme | Fit):
+    if isinstance(scheme, Scheme):
         return scheme
     if scheme not in SCHEMES:
         raise ValueError(f"scheme: expected one of {', '.join(SCHEMES)}, got {scheme!r}")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import Literal, NamedTuple
 
 import scipy
 
@@ -14,8 +14,22 @@ from quadcurv.types import Floats, Ints
 
 
 @dataclass(frozen=True)
-class Scheme:
-    """A discrete Laplace-Beltrami operator, local to the corners of quads and triangles.
+class Diamond:
+    """What a driver needs to know to apply the diamond scheme to positions without a matrix.
+
+    Attributes
+    ----------
+    area : {"ring", "quads"}
+        Dual area: half the vector area of the ring polygon (finite volumes), or a quarter of each quad
+        around (Liu's formula).
+    """
+
+    area: Literal["ring", "quads"]
+
+
+@dataclass(frozen=True)
+class Laplacian:
+    """A discrete Laplace-Beltrami operator, local to the corners of faces.
 
     With stiffness S and dual areas A the mean curvature normal is H n = -(S x) / (2 A) and the
     Laplace-Beltrami operator of f is -(S f) / A.
@@ -29,24 +43,22 @@ class Scheme:
     reference : str
         Where the formula stands.
     assemble : callable
-        Stencils -> (S, A): csr_array (n, p) and float64 (n,).
-    apply : callable
-        Stencils -> (-S x, A): float64 (n, 3) and (n,), without building S where that can be avoided.
-    write : callable, optional
-        (mesh, frame, results) -> None: the same in one compiled pass, divided and signed, into the arrays
-        of `results` by name. At all vertices of a grid that `frame` surrounds, or at the regular vertices
-        inside a face list. What :func:`quadcurv.evaluate` makes of `apply` is what it is tested against.
-    stiffness : callable, optional
-        (Stencils, out) -> S alone, into the arrays of `out`, a matrix of the same pattern, if not None.
+        Stencils -> (S, A): csr_array (n, p) and float64 (n,). This is the law; all else agrees with it.
+    flux : callable, optional
+        Stencils -> (-S x, A): float64 (n, 3) and (n,), where that can be had without building S.
+    fast : Diamond, optional
+        What a compiled driver needs to know of the scheme.
+    symmetric : bool
+        Whether S is symmetric on every mesh of quads.
     """
 
     name: str
     order: int
     reference: str
     assemble: Callable[[Stencils], tuple[scipy.sparse.csr_array, Floats]]
-    apply: Callable[[Stencils], tuple[Floats, Floats]]
-    write: Callable[[Mesh, Any, dict[str, Floats]], None] | None = None
-    stiffness: Callable[[Stencils, scipy.sparse.csr_array | None], scipy.sparse.csr_array] | None = None
+    flux: Callable[[Stencils], tuple[Floats, Floats]] | None = None
+    fast: Diamond | None = None
+    symmetric: bool = True
 
 
 class StandardErrors(NamedTuple):
@@ -111,3 +123,6 @@ class Fit:
     order: int
     reference: str
     curvatures: Callable[[Mesh, str], Curvatures]
+
+
+Scheme = Laplacian | Fit

@@ -8,7 +8,7 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-from quadcurv.schemes.base import Scheme
+from quadcurv.schemes.base import Laplacian
 from quadcurv.stencils import Stencils
 from quadcurv.types import Bools, Floats, Ints
 
@@ -16,7 +16,7 @@ VALENCES = (4, 6, 8)
 AREAS = ("barycentric", "voronoi")
 
 
-def cotan(valence: int = 6, area: str = "barycentric", diagonal: int = 0) -> Scheme:
+def cotan(valence: int = 6, area: str = "barycentric", diagonal: int = 0) -> Laplacian:
     """Cotan formula (Meyer et al. 2003, eq. 8; thesis, eq. 4.3) on quads cut into triangles.
 
     Parameters
@@ -32,7 +32,7 @@ def cotan(valence: int = 6, area: str = "barycentric", diagonal: int = 0) -> Sch
 
     Returns
     -------
-    Scheme
+    Laplacian
 
     Raises
     ------
@@ -67,20 +67,20 @@ def cotan(valence: int = 6, area: str = "barycentric", diagonal: int = 0) -> Sch
             areas[served] = A[:n][served]
         return stiffness, areas
 
-    def apply(stencils: Stencils) -> tuple[Floats, Floats]:
+    def flux(stencils: Stencils) -> tuple[Floats, Floats]:
         n = stencils.n
-        flux, areas = np.zeros((n, 3)), np.zeros(n)
+        into, areas = np.zeros((n, 3)), np.zeros(n)
         # Relative to one of the points: rows sum to zero, but only up to the rounding of their weights.
         x = stencils.points - stencils.points[0]
         for triangles, served in _triangulations(stencils, valence, diagonal):
             S, A = cotan_matrices(stencils.points, triangles, area)
-            flux[served] = -(S @ x)[:n][served]
+            into[served] = -(S @ x)[:n][served]
             areas[served] = A[:n][served]
-        return flux, areas
+        return into, areas
 
     name = f"cotan-{valence}" + ("'" if diagonal else "") + ("-voronoi" if area == "voronoi" else "")
     reference = "Meyer et al. 2003, eq. 8 (thesis, eq. 4.3), by libigl"
-    return Scheme(name, 2 if valence == 6 else 0, reference, assemble, apply)
+    return Laplacian(name, 2 if valence == 6 else 0, reference, assemble, flux, symmetric=valence == 6)
 
 
 def cotan_matrices(points: Floats, triangles: Ints, area: str) -> tuple[scipy.sparse.csr_array, Floats]:

@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-from functools import partial
-
 import numpy as np
 import scipy
 
-from quadcurv.schemes.base import Scheme
-from quadcurv.schemes.diamond import local_stiffness, quad_stiffness, scatter, stiffness, write
+from quadcurv.schemes.base import Diamond, Laplacian
+from quadcurv.schemes.diamond import local_stiffness, quad_stiffness, scatter
 from quadcurv.stencils import Stencils, face_pairs
 from quadcurv.types import Floats, Ints
 
@@ -56,7 +54,7 @@ def _dual_areas(stencils: Stencils) -> Floats:
     return np.linalg.norm(stencils.ring_areas, axis=1)
 
 
-def _apply(stencils: Stencils) -> tuple[Floats, Floats]:
+def _flux(stencils: Stencils) -> tuple[Floats, Floats]:
     from quadcurv.kernels import diamond
 
     flux, unused = np.zeros_like(stencils.points), np.zeros(len(stencils.points))
@@ -79,15 +77,14 @@ def _rows(stencils: Stencils) -> scipy.sparse.csr_array:
 
 
 def _assemble(stencils: Stencils) -> tuple[scipy.sparse.csr_array, Floats]:
-    return stiffness(stencils, general=_rows), _dual_areas(stencils)
+    return _rows(stencils)[: stencils.n], _dual_areas(stencils)
 
 
-FINITE_VOLUME = Scheme(
+FINITE_VOLUME = Laplacian(
     "finite_volume",
     2,
     "Hutchins 2013, eq. 3.16-3.35; Calhoun and Helzel 2009",
     _assemble,
-    _apply,
-    partial(write, liu=None),
-    partial(stiffness, general=_rows),
+    _flux,
+    Diamond("ring"),
 )

@@ -216,7 +216,8 @@ def _plain(mesh: Mesh, stencils: Stencils) -> tuple[Bools, Run]:
 
     wanted = np.ones(stencils.n, bool)
     if isinstance(mesh, QuadMesh):
-        wanted = (mesh._kind == topology.INTERIOR) | (mesh._kind == topology.BOUNDARY)
+        kind = mesh.connectivity.kind
+        wanted = (kind == topology.INTERIOR) | (kind == topology.BOUNDARY)
     return wanted, _on_grid(mesh, stencils) if isinstance(mesh, QuadGrid) else _on_faces(stencils)
 
 

@@ -2,19 +2,17 @@
 
 from __future__ import annotations
 
-from functools import partial
-
 import numpy as np
 import scipy
 
-from quadcurv.schemes.base import Scheme
+from quadcurv.schemes.base import Diamond, Laplacian
 from quadcurv.schemes.cotan import cotan_matrices
-from quadcurv.schemes.diamond import quad_stiffness, stiffness, write
+from quadcurv.schemes.diamond import quad_stiffness
 from quadcurv.stencils import Stencils
 from quadcurv.types import Floats
 
 
-def _apply(stencils: Stencils) -> tuple[Floats, Floats]:
+def _flux(stencils: Stencils) -> tuple[Floats, Floats]:
     from quadcurv.kernels import diamond
 
     flux, area = np.zeros_like(stencils.points), np.zeros(len(stencils.points))
@@ -33,15 +31,14 @@ def _rows(stencils: Stencils) -> scipy.sparse.csr_array:
 
 
 def _assemble(stencils: Stencils) -> tuple[scipy.sparse.csr_array, Floats]:
-    return stiffness(stencils, general=_rows), _apply(stencils)[1]
+    return _rows(stencils)[: stencils.n], _flux(stencils)[1]
 
 
-LIU = Scheme(
+LIU = Laplacian(
     "liu",
     2,
     "Liu, Xu and Zhang 2008, eq. 2.4 and 2.10 (thesis, eq. 4.4-4.7)",
     _assemble,
-    _apply,
-    partial(write, liu=0),
-    partial(stiffness, general=_rows),
+    _flux,
+    Diamond("quads"),
 )

@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 import scipy
 
-from quadcurv.schemes.base import Scheme
+from quadcurv.schemes.base import Laplacian
 from quadcurv.schemes.diamond import scatter
 from quadcurv.stencils import Stencils
 from quadcurv.types import Floats
@@ -16,7 +16,7 @@ from quadcurv.types import Floats
 Local = Callable[[Floats], tuple[Floats, Floats]]
 
 
-def bunge() -> Scheme:
+def bunge() -> Laplacian:
     """Cotan formula on fans about a virtual vertex in each face.
 
     The virtual vertex minimises the sum of the squared areas of its triangles and is the affine
@@ -27,7 +27,7 @@ def bunge() -> Scheme:
 
     Returns
     -------
-    Scheme
+    Laplacian
 
     References
     ----------
@@ -63,7 +63,7 @@ def bunge() -> Scheme:
     return _scheme("bunge", "Bunge, Herholz, Kazhdan and Botsch 2020", local)
 
 
-def de_goes(stabilisation: float = 1.0) -> Scheme:
+def de_goes(stabilisation: float = 1.0) -> Laplacian:
     """Laplacian of de Goes, Butts and Desbrun (2020): gradients and 1-forms of polygons.
 
     Parameters
@@ -73,7 +73,7 @@ def de_goes(stabilisation: float = 1.0) -> Scheme:
 
     Returns
     -------
-    Scheme
+    Laplacian
 
     Raises
     ------
@@ -99,7 +99,7 @@ def de_goes(stabilisation: float = 1.0) -> Scheme:
     return _scheme("de_goes", "de Goes, Butts and Desbrun 2020", local)
 
 
-def alexa_wardetzky(stabilisation: float = 1.0) -> Scheme:
+def alexa_wardetzky(stabilisation: float = 1.0) -> Laplacian:
     """Laplacian of Alexa and Wardetzky (2011): that of the largest projection of a polygon.
 
     Parameters
@@ -109,7 +109,7 @@ def alexa_wardetzky(stabilisation: float = 1.0) -> Scheme:
 
     Returns
     -------
-    Scheme
+    Laplacian
 
     Raises
     ------
@@ -143,7 +143,7 @@ def _checked(stabilisation: float) -> None:
         raise ValueError(f"stabilisation: expected a number, not negative, got {stabilisation!r}")
 
 
-def _scheme(name: str, reference: str, local: Local) -> Scheme:
+def _scheme(name: str, reference: str, local: Local) -> Laplacian:
     def assemble(stencils: Stencils) -> tuple[scipy.sparse.csr_array, Floats]:
         p = len(stencils.points)
         stiffness, areas = scipy.sparse.csr_array((p, p)), np.zeros(p)
@@ -157,12 +157,7 @@ def _scheme(name: str, reference: str, local: Local) -> Scheme:
             np.add.at(areas, faces, parts)
         return stiffness[: stencils.n], areas[: stencils.n]
 
-    def apply(stencils: Stencils) -> tuple[Floats, Floats]:
-        stiffness, areas = assemble(stencils)
-        # Relative to one of the points: rows sum to zero, but only up to the rounding of their weights.
-        return -(stiffness @ (stencils.points - stencils.points[0])), areas
-
-    return Scheme(name, 2, reference, assemble, apply)
+    return Laplacian(name, 2, reference, assemble)
 
 
 def _voronoi(across: Floats, double: Floats) -> Floats:

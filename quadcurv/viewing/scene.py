@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     import pyvista as pv
 
-    from quadcurv.schemes import Fit, Scheme
+    from quadcurv.schemes import Scheme
 
 
 class PlotterComponent:
@@ -29,7 +29,7 @@ class PlotterComponent:
         self,
         mesh: Any,
         exact: Any,
-        scheme: str | Scheme | Fit = "finite_volume",
+        scheme: str | Scheme = "finite_volume",
         limits: tuple[float, float] | None = None,
         **options: Any,
     ) -> pv.Actor:

@@ -1,0 +1,208 @@
+"""Faces over vertices, mended, turned to agree, and what follows from them alone."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any, NamedTuple
+
+import numpy as np
+import scipy
+from numpy.typing import NDArray
+
+from quadcurv.checks import Finding, GivenFaces, checked_faces
+from quadcurv.polygons import cut
+from quadcurv.stencils import Polygons, edges, face_pairs
+from quadcurv.types import Bools, Floats, Indices, Ints
+
+_FAR = 100_000  # vertices between neighbours in memory, on average, from which on reordering pays
+
+
+class Order(NamedTuple):
+    """Vertices in an order that keeps neighbours near in memory.
+
+    Attributes
+    ----------
+    vertices : (n,) int32
+        The k-th vertex in this order.
+    place : (n,) int32
+        Where each vertex stands in it.
+    ring : (n, 8) int32
+        Rings in this order, numbered by it.
+    """
+
+    vertices: Ints
+    place: Ints
+    ring: Ints
+
+
+@dataclass(frozen=True, eq=False)
+class Connectivity:
+    """What a face list is but for the positions; meshes that differ in these alone share it.
+
+    Attributes
+    ----------
+    faces : (m, 4) int32, read-only
+        Faces computed with, counter-clockwise; a triangle's last entry is -1.
+    source : (m,) int64 or None
+        The given face that each of `faces` stems from; None: itself.
+    polygons : Polygons or None
+        Faces of more than four sides, which `faces` has cut.
+    kind : (n,) uint8
+        What the faces around each vertex are, see :mod:`quadcurv.kernels.topology`.
+    ring : (n, 8) int32
+        (a, d, a, d, ...) around each regular vertex inside, first -1 for all others.
+    irregular : (k,) int64
+        Vertices without such a ring.
+    orientable : bool
+    findings : tuple of Finding
+        What was mended or has no answer.
+    order : Order or None
+    """
+
+    faces: Ints
+    source: Indices | None
+    polygons: Polygons | None
+    kind: NDArray[np.uint8]
+    ring: Ints
+    irregular: Indices
+    orientable: bool
+    findings: tuple[Finding, ...]
+    order: Order | None = None
+
+    @property
+    def closed(self) -> Bools:
+        """(n,) bool: whether the faces around a vertex are one closed fan."""
+        from quadcurv.kernels import topology
+
+        return self.kind == topology.INTERIOR
+
+    @cached_property
+    def scattered(self) -> bool:
+        """Whether neighbours lie so far apart in memory that no cache holds both."""
+        from quadcurv.kernels import topology
+
+        return bool(topology.mean_distance(self.faces) > topology.FAR)
+
+    @cached_property
+    def irregular_part(self) -> tuple[Indices, Ints]:
+        """Vertices and faces of the part of the mesh within four faces of irregular vertices, these first.
+
+        They have there all that a ghost layer or a scheme may look at.
+        """
+        from quadcurv.kernels import topology
+
+        return topology.part_around(self.faces, self.irregular, len(self.kind), 4)
+
+    def reordered(self) -> Connectivity:
+        """Return the same with an order that keeps neighbours near, where that pays."""
+        from quadcurv.kernels import topology
+
+        if self.order is not None or topology.mean_distance(self.faces) <= _FAR:
+            return self
+        vertices = topology.nearby_order(self.ring)
+        ring, place = topology.renumbered(self.ring, vertices)
+        return replace(self, order=Order(vertices, place, ring))
+
+
+def connect(faces: Any, points: Floats) -> Connectivity:
+    """Check and mend faces, turn them to agree with their neighbours, find the rings.
+
+    Raises
+    ------
+    MeshError
+        What :func:`quadcurv.checks.checked_faces` refuses.
+    """
+    from quadcurv.kernels import topology
+
+    given = checked_faces(faces, len(points))
+    findings = list(given.findings)
+    table, source, polygons = _without_polygons(given, points)
+    n = len(points)
+    ring, others, kind, bad_edge, n_disagree = topology.fans(table, n)
+    if bad_edge[2] or n_disagree:
+        kept = _first_of_doubles(table)
+        if kept.size < len(table):
+            first = np.delete(np.arange(len(table)), kept)[0]
+            first = int(first if source is None else source[first])
+            findings.append(Finding("double", len(table) - kept.size, f"face {first}"))
+            source = kept if source is None else source[kept]
+            table = table[kept]
+            if polygons is not None:
+                polygons = polygons._replace(face=polygons.face[kept])
+            ring, others, kind, bad_edge, n_disagree = topology.fans(table, n)
+    orientable = True
+    if n_disagree:
+        turn, orientable = _consistent_sides(table)
+        if turn.any():
+            where = np.unique(np.flatnonzero(turn) if source is None else source[turn])
+            findings.append(Finding("turned", where.size, f"face {where[0]}"))
+            table = table.copy()
+            quad = table[:, 3] >= 0
+            table[turn & quad] = table[turn & quad][:, [0, 3, 2, 1]]
+            table[turn & ~quad] = table[turn & ~quad][:, [0, 2, 1, 3]]
+            if polygons is not None:
+                polygons = polygons.turned(turn)
+            ring, others, kind, bad_edge, _ = topology.fans(table, n)
+    if bad_edge[2]:
+        ends = np.unique(edges(table).shared_by_many)
+        kind[ends] = topology.NONMANIFOLD
+        where = f"the one from vertex {bad_edge[0]} to {bad_edge[1]}"
+        findings.append(Finding("nonmanifold", int(bad_edge[2]), where))
+    several = np.flatnonzero(kind == topology.SEVERAL_FANS)
+    if several.size:
+        findings.append(Finding("fans", several.size, f"vertex {several[0]}"))
+    isolated = np.flatnonzero(kind == topology.ISOLATED)
+    if isolated.size:
+        findings.append(Finding("isolated", isolated.size, f"vertex {isolated[0]}"))
+    if not orientable:
+        findings.append(Finding("non_orientable", 1, ""))
+    for array in (table, kind, ring, others):
+        array.flags.writeable = False
+    return Connectivity(table, source, polygons, kind, ring, others, orientable, tuple(findings))
+
+
+def _without_polygons(given: GivenFaces, points: Floats) -> tuple[Ints, Indices | None, Polygons | None]:
+    """Faces of three and four sides, those of more being cut, in the order of the given ones."""
+    if given.large is None:
+        return given.table, given.source, None
+    large = given.large
+    triangles, of = cut(points, large.indptr, large.corners)
+    table = np.concatenate((given.table, np.insert(triangles, 3, -1, axis=1).astype(np.int32)))
+    source = np.concatenate((given.source, given.large_source[of]))
+    face = np.concatenate((np.full(len(given.table), -1), of))
+    order = np.argsort(source, kind="stable")
+    polygons = Polygons(large.indptr, large.corners, face[order])
+    return np.ascontiguousarray(table[order]), source[order], polygons
+
+
+def _first_of_doubles(faces: Ints) -> Indices:
+    """Of faces over the same vertices, whichever way round, the first ones."""
+    _, first = np.unique(np.sort(faces, axis=1), axis=0, return_index=True)
+    return np.sort(first)
+
+
+def _consistent_sides(faces: Ints) -> tuple[Bools, bool]:
+    """Which faces to turn, as few as possible, so that neighbours agree; and whether all then do.
+
+    Non-orientable components are left as they are.
+    """
+    m = len(faces)
+    f, i, g, j = face_pairs(faces)
+    same_way = faces[f, i] == faces[g, j]
+    # Node f is face f as given, node f + m the same face turned; an edge joins what goes together.
+    rows = np.concatenate((f, f + m))
+    columns = np.concatenate((np.where(same_way, g + m, g), np.where(same_way, g, g + m)))
+    graph = scipy.sparse.coo_array((np.ones(rows.size, bool), (rows, columns)), shape=(2 * m, 2 * m))
+    label = scipy.sparse.csgraph.connected_components(graph, directed=False)[1]
+    orientable = not bool((label[:m] == label[m:]).any())
+    kept = np.bincount(label[:m], minlength=label.max() + 1)
+    turned = np.bincount(label[m:], minlength=label.max() + 1)
+    # A component and its mirror image differ in which faces they turn: keep the one that turns fewer.
+    ours, theirs = kept[label[:m]], turned[label[:m]]
+    first = np.full(label.max() + 1, m)
+    np.minimum.at(first, label[:m], np.arange(m))
+    mirror = np.empty(label.max() + 1, np.int64)
+    mirror[label[:m]] = label[m:]
+    tie = first[label[:m]] > first[mirror[label[:m]]]
+    return (ours < theirs) | ((ours == theirs) & tie), orientable

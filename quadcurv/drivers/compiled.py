@@ -1,0 +1,159 @@
+"""The diamond schemes in compiled passes over grids and rings, by several threads.
+
+What has no regular ring, and what is cut off at open sides, comes from `direct`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from functools import partial
+
+import numpy as np
+import scipy
+
+from quadcurv.boundary import frame, ghosts, with_ghosts
+from quadcurv.drivers import direct
+from quadcurv.mesh import QuadGrid, QuadMesh, StaggeredGrid
+from quadcurv.schemes import Diamond, Laplacian
+from quadcurv.stencils import Stencils
+from quadcurv.types import Floats
+
+# Of one vertex of a face list and of one row of a matrix, in vertices of a grid.
+_RING_WORK, _ROW_WORK = 4, 8
+_RESULTS = ("mean_curvature_normal", "mean_curvature", "vertex_normals", "dual_areas")
+
+
+def evaluate_faces(mesh: QuadMesh, scheme: Laplacian, boundary: str, results: Mapping[str, Floats]) -> None:
+    """Regular vertices in one pass, the others from the stencils of the part of the mesh around them."""
+    assert scheme.fast is not None
+    _evaluate_rings(mesh, scheme.fast, results)
+    others, part = mesh.irregular_part()
+    if others.size:
+        inner = {name: np.empty(part.shape + direct.PER_VERTEX[name]) for name in results}
+        treated = with_ghosts(part, ghosts(part))[0] if boundary == "extrapolate" else part
+        direct.evaluate(part, treated, scheme, inner)
+        for name, values in inner.items():
+            results[name][others] = values[: others.size]
+    if not mesh.orientable and "mean_curvature" in results:
+        np.abs(results["mean_curvature"], out=results["mean_curvature"])
+
+
+def evaluate_grid(
+    grid: QuadGrid | StaggeredGrid, scheme: Laplacian, boundary: str, results: Mapping[str, Floats]
+) -> None:
+    """All in one pass, save what is cut off at open sides: from the stencils of two rows along them."""
+    assert scheme.fast is not None
+    _evaluate_rows(grid, scheme.fast, boundary, results)
+    cut = {"dual_areas"} if boundary == "extrapolate" else {"dual_areas", "vertex_normals"}
+    if not cut & results.keys() or (isinstance(grid, StaggeredGrid) and grid.has_ghosts):
+        return
+    for axis in (0, 1):
+        if grid.wrap[axis]:
+            continue
+        for end in (0, -1):
+            side = grid.side(axis, end)
+            inner = {name: np.empty(side.shape + direct.PER_VERTEX[name]) for name in cut & results.keys()}
+            direct.evaluate(side.stencils(), side.stencils(), scheme, inner)
+            for name, values in inner.items():
+                np.moveaxis(results[name], axis, 0)[end] = np.moveaxis(values, axis, 0)[end]
+
+
+def _evaluate_rows(
+    grid: QuadGrid | StaggeredGrid, diamond_of: Diamond, boundary: str, results: Mapping[str, Floats]
+) -> None:
+    from quadcurv.kernels import diamond, ranges
+
+    wanted = [results[name].ravel() if name in results else None for name in _RESULTS]
+    liu = 0 if diamond_of.area == "quads" else None
+    around = frame(grid, boundary)
+    r, c = grid.shape
+    if isinstance(grid, QuadGrid):
+        kernel = partial(diamond.vertices, grid.points.ravel(), *around, liu, *wanted)
+    else:
+        dual = grid.dual
+        for axis in (0, 1):
+            first, last = np.moveaxis(dual, axis, 0)[[0, -1]]
+            if grid.wrap[axis] and not np.array_equal(first, last):  # the seam is that of the first
+                dual = dual.copy()
+                np.moveaxis(dual, axis, 0)[-1] = first
+        points, halo = grid.primal.ravel(), int(grid.has_ghosts)
+        kernel = partial(diamond.cells, points, *around, halo, dual.ravel(), liu, *wanted)
+    ranges.over(kernel, r, r * c, diamond.LEAST_ROWS)
+
+
+def _evaluate_rings(mesh: QuadMesh, diamond_of: Diamond, results: Mapping[str, Floats]) -> None:
+    """Regular vertices, in an order that keeps neighbours close if the mesh has one."""
+    from quadcurv.kernels import diamond, ranges
+
+    wanted = [results[name].ravel() if name in results else None for name in _RESULTS]
+    liu = 0 if diamond_of.area == "quads" else None
+    n, connectivity = len(mesh.points), mesh.connectivity
+    points, found, order = mesh.points.ravel(), wanted, connectivity.order
+    if order is not None:
+        points = np.empty(3 * n)
+        ranges.over(partial(diamond.gather, mesh.points.ravel(), order.vertices, points), n, n)
+        found = [None if values is None else np.empty_like(values) for values in wanted]
+    ring = connectivity.ring if order is None else order.ring
+    far = order is None and connectivity.scattered
+    ranges.over(partial(diamond.rings, points, ring, far, liu, *found), n, _RING_WORK * n, diamond.BLOCK)
+    if order is not None:
+        # Reads from everywhere overlap, writes to everywhere wait: hence not straight to their places.
+        for values, ordered in zip(wanted, found, strict=True):
+            if values is not None:
+                ranges.over(partial(diamond.gather, ordered, order.place, values), n, n)
+
+
+def stiffness(
+    stencils: Stencils, scheme: Laplacian, out: scipy.sparse.csr_array | None = None
+) -> scipy.sparse.csr_array:
+    """(n, p) stiffness: regular rows straight into CSR, the others assembled on the faces around them.
+
+    The arrays of `out`, of the same pattern, are written to.
+    """
+    from quadcurv.kernels import diamond, ranges, topology
+
+    n, p, others = stencils.n, len(stencils.points), stencils.irregular
+    indptr, rows = np.arange(0, 9 * n + 1, 9), None
+    if others.size:
+        size = np.full(n, 9)
+        vertices, faces = topology.part_around(stencils.faces, others, p, 2)
+        closed = np.zeros(vertices.size, bool)
+        part = Stencils(stencils.points[vertices], faces, (vertices.size,), closed, stencils.orientable)
+        rows = scipy.sparse.csr_array(direct.without_infinity(scheme.assemble(part)[0])[: others.size])
+        rows = scipy.sparse.csr_array((rows.data, vertices[rows.indices], rows.indptr), (others.size, p))
+        rows.sort_indices()
+        size[others] = np.diff(rows.indptr)
+        np.cumsum(size, out=indptr[1:])
+    if indptr[-1] > np.iinfo(np.int32).max:
+        return direct.without_infinity(scheme.assemble(stencils)[0])
+    indptr = indptr.astype(np.int32)
+    if out is None:
+        arrays = np.empty(indptr[-1]), np.empty(indptr[-1], np.int32), indptr
+        out = scipy.sparse.csr_array(arrays, (n, p))
+    else:
+        _check_matrix(out, (n, p), indptr)
+    if rows is not None:
+        place = np.repeat(indptr[others] - rows.indptr[:-1], np.diff(rows.indptr)) + np.arange(rows.nnz)
+        out.indices[place], out.data[place] = rows.indices, rows.data
+    points, ring = stencils.points.ravel(), stencils.ring
+    kernel = partial(diamond.ring_stiffness, points, ring, indptr, out.indices, out.data)
+    ranges.over(kernel, n, _ROW_WORK * n, diamond.BLOCK)
+    return out
+
+
+def _check_matrix(out: scipy.sparse.csr_array, shape: tuple[int, int], indptr: np.ndarray) -> None:
+    """The kernels write to the arrays of `out` without looking again."""
+    fits = (
+        type(out) is scipy.sparse.csr_array
+        and out.shape == shape
+        and all(type(a) is np.ndarray and a.flags.c_contiguous for a in (out.data, out.indices, out.indptr))
+        and out.data.dtype == np.float64
+        and out.indices.dtype == out.indptr.dtype == np.int32
+        and out.data.shape == out.indices.shape == (indptr[-1],)
+        and out.data.flags.writeable
+        and out.indices.flags.writeable
+        and not np.shares_memory(out.data, out.indices)
+        and np.array_equal(out.indptr, indptr)
+    )
+    if not fits:
+        raise ValueError("out: expected a stiffness matrix of the same mesh and scheme")
