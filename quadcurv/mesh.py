@@ -156,15 +156,15 @@ class QuadMesh:
         the place of every vertex in it. It pays on large meshes whose neighbours are far apart in memory,
         and takes the time of several evaluations: it is made the second time that a connectivity is used.
         """
-        from quadcurv.kernels import topology
+        from quadcurv.kernels import order as orders
 
         shared = self._shared
         given: tuple[tuple[Ints, Ints] | None, Ints] = None, self._ring
         if "rings" not in shared and shared.setdefault("uses", 0) > 0:
             found = given
             if self.distance > _FAR:
-                order = topology.nearby_order(self._ring)
-                ring, place = topology.renumbered(self._ring, order)
+                order = orders.nearby_order(self._ring)
+                ring, place = orders.renumbered(self._ring, order)
                 found = (order, place), ring
             shared["rings"] = found  # at once: other threads see both or neither
         shared["uses"] = 1

@@ -24,10 +24,10 @@ _B = np.array([[-1.0, 0.0, 1.0, 0.0], [0.0, -1.0, 0.0, 1.0]])
 
 def local_stiffness(points: Floats, quads: Ints) -> Floats:
     """(m, 4, 4) stiffness of each quad, not finite for one without area."""
-    from quadcurv.kernels import diamond
+    from quadcurv.kernels import faces
 
     with np.errstate(invalid="ignore"):
-        return np.einsum("ai,mab,bj->mij", _B, diamond.conductances(points, quads), _B, optimize=True)
+        return np.einsum("ai,mab,bj->mij", _B, faces.conductances(points, quads), _B, optimize=True)
 
 
 def scatter(local: Floats, rows: Ints, columns: Ints, shape: tuple[int, int]) -> scipy.sparse.csr_array:
@@ -47,7 +47,7 @@ def stiffness(
     `general` gives the rows of all vertices of its stencils. The arrays of `out`, of the same pattern, are
     written to.
     """
-    from quadcurv.kernels import diamond, ranges, topology
+    from quadcurv.kernels import ranges, rings, topology
 
     n, p, others = stencils.n, len(stencils.points), stencils.irregular
     indptr, rows = np.arange(0, 9 * n + 1, 9), None
@@ -73,8 +73,8 @@ def stiffness(
         place = np.repeat(indptr[others] - rows.indptr[:-1], np.diff(rows.indptr)) + np.arange(rows.nnz)
         out.indices[place], out.data[place] = rows.indices, rows.data
     points, ring = stencils.points.ravel(), stencils.ring
-    kernel = partial(diamond.ring_stiffness, points, ring, indptr, out.indices, out.data)
-    ranges.over(kernel, n, _ROW_WORK * n, diamond.BLOCK)
+    kernel = partial(rings.ring_stiffness, points, ring, indptr, out.indices, out.data)
+    ranges.over(kernel, n, _ROW_WORK * n, rings.BLOCK)
     return out
 
 
@@ -95,7 +95,7 @@ def quad_stiffness(stencils: Stencils) -> scipy.sparse.csr_array:
 
 def write(mesh: Mesh, frame: Frame | None, results: dict[str, Floats], *, liu: int | None) -> None:
     """Run the kernels: see `Scheme.write`; liu is 0 for Liu's dual area, None for the ring polygon's."""
-    from quadcurv.kernels import diamond, ranges
+    from quadcurv.kernels import cells, ranges, rows
 
     names = ("mean_curvature_normal", "mean_curvature", "vertex_normals", "dual_areas")
     wanted = [results[name].ravel() if name in results else None for name in names]
@@ -105,7 +105,7 @@ def write(mesh: Mesh, frame: Frame | None, results: dict[str, Floats], *, liu: i
     assert frame is not None
     r, c = mesh.shape
     if isinstance(mesh, QuadGrid):
-        kernel = partial(diamond.vertices, mesh.points.ravel(), *frame, liu, *wanted)
+        kernel = partial(rows.grid_curvatures, mesh.points.ravel(), *frame, liu, *wanted)
     else:
         dual = mesh.dual
         for axis in (0, 1):
@@ -114,13 +114,14 @@ def write(mesh: Mesh, frame: Frame | None, results: dict[str, Floats], *, liu: i
                 dual = dual.copy()
                 np.moveaxis(dual, axis, 0)[-1] = first
         points, halo = mesh.primal.ravel(), int(mesh.has_ghosts)
-        kernel = partial(diamond.cells, points, *frame, halo, dual.ravel(), liu, *wanted)
-    ranges.over(kernel, r, r * c, diamond.LEAST_ROWS)
+        kernel = partial(cells.staggered_curvatures, points, *frame, halo, dual.ravel(), liu, *wanted)
+    ranges.over(kernel, r, r * c, rows.LEAST_ROWS)
 
 
 def _write_rings(mesh: QuadMesh, liu: int | None, wanted: list[Floats | None]) -> None:
     """Regular vertices, in an order that keeps neighbours close where the mesh's own does not."""
-    from quadcurv.kernels import diamond, ranges, topology
+    from quadcurv.kernels import order as orders
+    from quadcurv.kernels import ranges, rings, topology
 
     n = len(mesh.points)
     order, ring = mesh.ring_order()
@@ -128,12 +129,14 @@ def _write_rings(mesh: QuadMesh, liu: int | None, wanted: list[Floats | None]) -
     if order is not None:
         there, back = order
         points = np.empty(3 * n)
-        ranges.over(partial(diamond.gather, mesh.points.ravel(), there, points), n, n)
+        ranges.over(partial(orders.gather, mesh.points.ravel(), there, points), n, n)
         found = [None if values is None else np.empty_like(values) for values in wanted]
     far = order is None and mesh.distance > topology.FAR
-    ranges.over(partial(diamond.rings, points, ring, far, liu, *found), n, _RING_WORK * n, diamond.BLOCK)
+    ranges.over(
+        partial(rings.ring_curvatures, points, ring, far, liu, *found), n, _RING_WORK * n, rings.BLOCK
+    )
     if order is not None:
         # Reads from everywhere overlap, writes to everywhere wait: hence not straight to their places.
         for values, ordered in zip(wanted, found, strict=True):
             if values is not None:
-                ranges.over(partial(diamond.gather, ordered, back, values), n, n)
+                ranges.over(partial(orders.gather, ordered, back, values), n, n)
