@@ -26,7 +26,7 @@ from numpy.typing import NDArray
 
 import quadcurv as qc
 from comparisons.common import COLOURS, MARKERS, arguments, figure, paper_style, save_figure
-from quadcurv.kernels import diamond, ranges
+from quadcurv.kernels import quad, ranges, vector
 from quadcurv.schemes.diamond import quad_stiffness
 
 Floats = NDArray[np.float64]
@@ -103,10 +103,10 @@ def numpy_finite_volume(points: Floats) -> Floats:
     return flux / (2 * area)
 
 
-def interpreted(module: ModuleType, **instead: Any) -> dict[str, Any]:
-    """What is in a module of kernels, these as plain Python that calls plain Python; some names replaced."""
-    kernels = {name: f.py_func for name, f in vars(module).items() if hasattr(f, "py_func")}
-    names = dict(vars(module))
+def interpreted(*modules: ModuleType, **instead: Any) -> dict[str, Any]:
+    """What is in modules of kernels, these as plain Python that calls plain Python; some names replaced."""
+    names = {name: value for module in modules for name, value in vars(module).items()}
+    kernels = {name: f.py_func for name, f in names.items() if hasattr(f, "py_func")}
     names.update({name: FunctionType(f.__code__, names) for name, f in kernels.items()})
     names.update(instead)
     return names
@@ -150,7 +150,8 @@ def operations(newton: bool = False) -> dict[str, int]:
             setattr(Counted, kind.format(name), counting(kind.format(name)))
 
     names = interpreted(
-        diamond,
+        vector,
+        quad,
         guess=lambda x: Counted(float(x) ** -0.5),  # no floating-point operation
         muladd=lambda a, b, c: a * b + c,
         **({} if newton else {"reciprocal_root": lambda x: 1 / (x * 1)}),  # counts as two
@@ -170,9 +171,9 @@ def operations(newton: bool = False) -> dict[str, int]:
         "fluxes": run("fluxes", u, v, u),
         "sums": 9,
         # Of H n alone; Liu's sum of areas is not asked for.
-        "area": run("enclose", planes, 0, 1, u, v, None, None, None)
-        + run("weigh", planes, 0, 1, 0.0, None, None, None, None, 0),
-        "scaling": run("finish", u, planes, 0, 1, np.empty(3), None, 0),
+        "area": run("ring_normal", planes, 0, 1, u, v, None, None, None)
+        + run("flux_scale", planes, 0, 1, 0.0, None, None, None, None, 0),
+        "scaling": run("store_curvature", u, planes, 0, 1, np.empty(3), None, 0),
     }
     return {**parts, "all": sum(parts.values())}
 

@@ -96,12 +96,12 @@ class Connectivity:
 
     def reordered(self) -> Connectivity:
         """Return the same with an order that keeps neighbours near, where that pays."""
-        from quadcurv.kernels import topology
+        from quadcurv.kernels import order, topology
 
         if self.order is not None or topology.mean_distance(self.faces) <= _FAR:
             return self
-        vertices = topology.nearby_order(self.ring)
-        ring, place = topology.renumbered(self.ring, vertices)
+        vertices = order.nearby_order(self.ring)
+        ring, place = order.renumbered(self.ring, vertices)
         return replace(self, order=Order(vertices, place, ring))
 
 

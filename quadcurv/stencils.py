@@ -138,11 +138,11 @@ class Stencils:
     @cached_property
     def ring_areas(self) -> Floats:
         """(n, 3) float64: half the vector area of each ring polygon; it points along the normal."""
-        from quadcurv.kernels import diamond
+        from quadcurv.kernels import faces
 
         if self.orientable:
             normal = np.zeros_like(self.points)
-            diamond.ring_normals(self.points, self.faces, normal)
+            faces.ring_normals(self.points, self.faces, normal)
             normal = normal[: self.n]
         else:  # faces disagree somewhere: the corner table has each ring turned one way
             indptr, c, a, _, b = self.corner_table

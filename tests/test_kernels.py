@@ -21,7 +21,7 @@ from numba import config, njit
 import quadcurv as qc
 from comparisons.performance import interpreted
 from quadcurv import SCHEMES, QuadGrid, QuadMesh, StaggeredGrid
-from quadcurv.kernels import compiled, diamond, ranges, topology
+from quadcurv.kernels import compiled, order, ranges, rows, topology, vector
 
 NAMES = ("mean_curvature", "mean_curvature_normal", "vertex_normals", "dual_areas")
 DIRECT = ("finite_volume", "liu")
@@ -95,7 +95,7 @@ def test_ghost_cells(scheme, boundary, shape):
 
 @pytest.mark.parametrize("scheme", DIRECT)
 def test_columns_beyond_the_width_done_at_once(scheme):
-    shape = (6, diamond.WIDTH + 3)
+    shape = (6, rows.WIDTH + 3)
     for wrap in WRAPS:
         same(QuadGrid(rough(shape), wrap), scheme, "nan")
     points = rough((2 * shape[0] + 1, 2 * shape[1] + 1))
@@ -171,17 +171,17 @@ def test_extraordinary_isolated_and_non_orientable(scheme):
 
 @njit
 def reciprocal_roots(x):
-    """`diamond.reciprocal_root` of all numbers."""
+    """`vector.reciprocal_root` of all numbers."""
     y = np.empty_like(x)
     for k in range(x.size):
-        y[k] = diamond.reciprocal_root(x[k])
+        y[k] = vector.reciprocal_root(x[k])
     return y
 
 
 def test_reciprocal_roots_are_right_to_the_last_digit_or_two():
     """The guess depends on two octaves, the exponent is halved; the rest of the range is sampled."""
     rng = np.random.default_rng(0)
-    x = np.concatenate((np.linspace(1, 4, 300_001), np.exp(rng.uniform(-708, 709, 100_000)), [diamond.LEAST]))
+    x = np.concatenate((np.linspace(1, 4, 300_001), np.exp(rng.uniform(-708, 709, 100_000)), [vector.LEAST]))
     y = reciprocal_roots(x)
     exact = 1 / np.sqrt(x.astype(np.longdouble))
     assert np.abs(y / exact - 1).max() < 4 * 2.0**-53  # 1.25 where products and sums are rounded once
@@ -248,7 +248,7 @@ def test_results_are_bitwise_the_same_for_any_number_of_threads(scheme, threads,
     meshes = (grid, mesh, cells)
     before = [qc.evaluate(m, *NAMES, scheme=scheme) for m in meshes]
     monkeypatch.setattr(ranges, "SERIAL_BELOW", 0)
-    monkeypatch.setattr(diamond, "LEAST_ROWS", 1)
+    monkeypatch.setattr(rows, "LEAST_ROWS", 1)
     qc.set_threads(threads)
     for one, many in zip(before, (qc.evaluate(m, *NAMES, scheme=scheme) for m in meshes), strict=True):
         for name in NAMES:
@@ -296,9 +296,9 @@ def test_far_neighbours_are_brought_together(monkeypatch):
     monkeypatch.setattr("quadcurv.connectivity._FAR", 0)
     again = mesh.reordered().with_points(points)
     second = qc.evaluate(again, *NAMES)
-    order, place, ring = again.connectivity.order
-    np.testing.assert_array_equal(order[place], np.arange(len(points)))
-    assert sorted(order) == list(range(len(points)))
+    nearby, place, ring = again.connectivity.order
+    np.testing.assert_array_equal(nearby[place], np.arange(len(points)))
+    assert sorted(nearby) == list(range(len(points)))
     regular = ring[:, 0] >= 0
     assert np.median(np.abs(ring[regular] - np.flatnonzero(regular)[:, None])) < 100
     for name in NAMES:
@@ -322,10 +322,10 @@ def test_asking_for_memory_ahead_changes_nothing(monkeypatch):
 def test_patches_hold_every_vertex_once_and_keep_neighbours_together(patch, near):
     points, faces = sheet((40, 50), n_triangles=30, hole=True)
     ring = QuadMesh(points, faces).connectivity.ring
-    order = interpreted(topology, PATCH=patch)["nearby_order"](ring)
-    assert sorted(order) == list(range(len(points)))
+    nearby = interpreted(order, PATCH=patch)["nearby_order"](ring)
+    assert sorted(nearby) == list(range(len(points)))
     regular = np.flatnonzero(ring[:, 0] >= 0)
-    place = np.argsort(order)
+    place = np.argsort(nearby)
     apart = np.abs(place[ring[regular, ::2]] - place[regular, None])
     assert (apart < patch).mean() >= near  # 5 % and 58 % for 50 and 700 in random order
 
@@ -442,8 +442,8 @@ def test_compiled_code_is_not_stale_after_an_edit(copy):
     before = run(copy)
     assert run(copy) == before
     cached = copy / "quadcurv" / "kernels" / "__pycache__"
-    assert list(cached.glob("diamond.quads*.nbi"))
-    source = copy / "quadcurv" / "kernels" / "diamond.py"
+    assert list(cached.glob("faces.quad_fluxes*.nbi"))
+    source = copy / "quadcurv" / "kernels" / "faces.py"
     # A helper of the compiled entry points: the flux doubled.
     text = source.read_text()
     assert "scale = 0.5 / length" in text

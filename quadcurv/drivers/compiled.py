@@ -61,14 +61,14 @@ def evaluate_grid(
 def _evaluate_rows(
     grid: QuadGrid | StaggeredGrid, diamond_of: Diamond, boundary: str, results: Mapping[str, Floats]
 ) -> None:
-    from quadcurv.kernels import diamond, ranges
+    from quadcurv.kernels import cells, ranges, rows
 
     wanted = [results[name].ravel() if name in results else None for name in _RESULTS]
     liu = 0 if diamond_of.area == "quads" else None
     around = frame(grid, boundary)
     r, c = grid.shape
     if isinstance(grid, QuadGrid):
-        kernel = partial(diamond.vertices, grid.points.ravel(), *around, liu, *wanted)
+        kernel = partial(rows.grid_curvatures, grid.points.ravel(), *around, liu, *wanted)
     else:
         dual = grid.dual
         for axis in (0, 1):
@@ -77,13 +77,14 @@ def _evaluate_rows(
                 dual = dual.copy()
                 np.moveaxis(dual, axis, 0)[-1] = first
         points, halo = grid.primal.ravel(), int(grid.has_ghosts)
-        kernel = partial(diamond.cells, points, *around, halo, dual.ravel(), liu, *wanted)
-    ranges.over(kernel, r, r * c, diamond.LEAST_ROWS)
+        kernel = partial(cells.staggered_curvatures, points, *around, halo, dual.ravel(), liu, *wanted)
+    ranges.over(kernel, r, r * c, rows.LEAST_ROWS)
 
 
 def _evaluate_rings(mesh: QuadMesh, diamond_of: Diamond, results: Mapping[str, Floats]) -> None:
     """Regular vertices, in an order that keeps neighbours close if the mesh has one."""
-    from quadcurv.kernels import diamond, ranges
+    from quadcurv.kernels import order as orders
+    from quadcurv.kernels import ranges, rings
 
     wanted = [results[name].ravel() if name in results else None for name in _RESULTS]
     liu = 0 if diamond_of.area == "quads" else None
@@ -91,16 +92,18 @@ def _evaluate_rings(mesh: QuadMesh, diamond_of: Diamond, results: Mapping[str, F
     points, found, order = mesh.points.ravel(), wanted, connectivity.order
     if order is not None:
         points = np.empty(3 * n)
-        ranges.over(partial(diamond.gather, mesh.points.ravel(), order.vertices, points), n, n)
+        ranges.over(partial(orders.gather, mesh.points.ravel(), order.vertices, points), n, n)
         found = [None if values is None else np.empty_like(values) for values in wanted]
     ring = connectivity.ring if order is None else order.ring
     far = order is None and connectivity.scattered
-    ranges.over(partial(diamond.rings, points, ring, far, liu, *found), n, _RING_WORK * n, diamond.BLOCK)
+    ranges.over(
+        partial(rings.ring_curvatures, points, ring, far, liu, *found), n, _RING_WORK * n, rings.BLOCK
+    )
     if order is not None:
         # Reads from everywhere overlap, writes to everywhere wait: hence not straight to their places.
         for values, ordered in zip(wanted, found, strict=True):
             if values is not None:
-                ranges.over(partial(diamond.gather, ordered, order.place, values), n, n)
+                ranges.over(partial(orders.gather, ordered, order.place, values), n, n)
 
 
 def stiffness(
@@ -110,7 +113,7 @@ def stiffness(
 
     The arrays of `out`, of the same pattern, are written to.
     """
-    from quadcurv.kernels import diamond, ranges, topology
+    from quadcurv.kernels import ranges, rings, topology
 
     n, p, others = stencils.n, len(stencils.points), stencils.irregular
     indptr, rows = np.arange(0, 9 * n + 1, 9), None
@@ -136,8 +139,8 @@ def stiffness(
         place = np.repeat(indptr[others] - rows.indptr[:-1], np.diff(rows.indptr)) + np.arange(rows.nnz)
         out.indices[place], out.data[place] = rows.indices, rows.data
     points, ring = stencils.points.ravel(), stencils.ring
-    kernel = partial(diamond.ring_stiffness, points, ring, indptr, out.indices, out.data)
-    ranges.over(kernel, n, _ROW_WORK * n, diamond.BLOCK)
+    kernel = partial(rings.ring_stiffness, points, ring, indptr, out.indices, out.data)
+    ranges.over(kernel, n, _ROW_WORK * n, rings.BLOCK)
     return out
 
 

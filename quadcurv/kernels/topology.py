@@ -13,7 +13,6 @@ from quadcurv.kernels.compiled import helper, kernel, prefetch
 ISOLATED, INTERIOR, BOUNDARY, SEVERAL_FANS, NONMANIFOLD = 0, 1, 2, 3, 4
 FAR = 10_000  # vertices between neighbours in memory, on average, that are in no cache
 AHEAD = 16  # faces or vertices: where what is read next lies far apart, it is asked for that early
-PATCH = 65536  # vertices: one step of breadth-first order through them stays in the first-level cache
 
 
 @kernel
@@ -199,62 +198,6 @@ def part_around(faces, vertices, n, reach):
     place = np.full(n + 1, -1, np.int32)  # the last one, which -1 reads, stays -1
     place[kept] = np.arange(kept.size)
     return kept, place[near]
-
-
-@helper
-def free_neighbour(ring, v, placed):
-    """A neighbour of a regular vertex that has no place yet, -1 if there is none."""
-    if ring[v, 0] >= 0:
-        for k in range(0, 8, 2):
-            if not placed[ring[v, k]]:
-                return ring[v, k]
-    return -1
-
-
-@kernel
-def nearby_order(ring):
-    """Vertices patch by patch, each of PATCH neighbours along the edges of regular vertices.
-
-    A patch is a vertex and what comes next in breadth-first order; it begins beside an earlier one.
-    """
-    n = ring.shape[0]
-    order = np.empty(n, np.int32)
-    placed = np.zeros(n, np.bool_)
-    size = beside = 0
-    for root in range(n):
-        start = -1 if placed[root] else root
-        while start >= 0:
-            order[size], placed[start] = start, True
-            head, end = size, min(size + PATCH, n)
-            size += 1
-            while head < size < end:
-                x = free_neighbour(ring, order[head], placed)
-                if x < 0:
-                    head += 1
-                else:
-                    order[size], placed[x] = x, True
-                    size += 1
-            start = -1
-            while beside < size and start < 0:
-                start = free_neighbour(ring, order[beside], placed)
-                beside += start < 0
-    return order
-
-
-@kernel
-def renumbered(ring, order):
-    """Rings in another order, their vertices numbered by place in it; and the places."""
-    place = np.empty(order.size, np.int32)
-    for k in range(order.size):
-        place[order[k]] = k
-    moved = np.empty_like(ring)
-    for k in range(order.size):
-        v = order[k]
-        moved[k, 0] = -1
-        if ring[v, 0] >= 0:
-            for j in range(8):
-                moved[k, j] = place[ring[v, j]]
-    return moved, place
 
 
 @helper

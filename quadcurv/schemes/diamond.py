@@ -17,10 +17,10 @@ _B = np.array([[-1.0, 0.0, 1.0, 0.0], [0.0, -1.0, 0.0, 1.0]])
 
 def local_stiffness(points: Floats, quads: Ints) -> Floats:
     """(m, 4, 4) stiffness of each quad, not finite for one without area."""
-    from quadcurv.kernels import diamond
+    from quadcurv.kernels import faces
 
     with np.errstate(invalid="ignore"):
-        return np.einsum("ai,mab,bj->mij", _B, diamond.conductances(points, quads), _B, optimize=True)
+        return np.einsum("ai,mab,bj->mij", _B, faces.conductances(points, quads), _B, optimize=True)
 
 
 def scatter(local: Floats, rows: Ints, columns: Ints, shape: tuple[int, int]) -> scipy.sparse.csr_array:

@@ -55,13 +55,13 @@ def _dual_areas(stencils: Stencils) -> Floats:
 
 
 def _flux(stencils: Stencils) -> tuple[Floats, Floats]:
-    from quadcurv.kernels import diamond
+    from quadcurv.kernels import faces
 
     flux, unused = np.zeros_like(stencils.points), np.zeros(len(stencils.points))
-    diamond.quads(stencils.points, stencils.faces, flux, unused)
+    faces.quad_fluxes(stencils.points, stencils.faces, flux, unused)
     if stencils.has_triangles:
         corners, _, points = _flap_points(stencils)
-        diamond.flaps(points, corners, flux)
+        faces.flap_fluxes(points, corners, flux)
     return flux[: stencils.n], _dual_areas(stencils)
 
 

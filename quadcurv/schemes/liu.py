@@ -13,12 +13,12 @@ from quadcurv.types import Floats
 
 
 def _flux(stencils: Stencils) -> tuple[Floats, Floats]:
-    from quadcurv.kernels import diamond
+    from quadcurv.kernels import faces
 
     flux, area = np.zeros_like(stencils.points), np.zeros(len(stencils.points))
-    diamond.quads(stencils.points, stencils.faces, flux, area)
+    faces.quad_fluxes(stencils.points, stencils.faces, flux, area)
     if stencils.has_triangles:
-        diamond.triangles(stencils.points, stencils.faces, flux, area)
+        faces.triangle_fluxes(stencils.points, stencils.faces, flux, area)
     return flux[: stencils.n], area[: stencils.n]
 
 

@@ -1,0 +1,75 @@
+"""An order of the vertices of a face list that keeps neighbours close in memory."""
+
+import numpy as np
+
+from quadcurv.kernels.compiled import helper, kernel
+from quadcurv.kernels.vector import ONE, THREE, place, triple
+
+PATCH = 65536  # vertices: one step of breadth-first order through them stays in the first-level cache
+
+
+@helper
+def free_neighbour(ring, v, placed):
+    """A neighbour of a regular vertex that has no place yet, -1 if there is none."""
+    if ring[v, 0] >= 0:
+        for k in range(0, 8, 2):
+            if not placed[ring[v, k]]:
+                return ring[v, k]
+    return -1
+
+
+@kernel
+def nearby_order(ring):
+    """Vertices patch by patch, each of PATCH neighbours along the edges of regular vertices.
+
+    A patch is a vertex and what comes next in breadth-first order; it begins beside an earlier one.
+    """
+    n = ring.shape[0]
+    order = np.empty(n, np.int32)
+    placed = np.zeros(n, np.bool_)
+    size = beside = 0
+    for root in range(n):
+        start = -1 if placed[root] else root
+        while start >= 0:
+            order[size], placed[start] = start, True
+            head, end = size, min(size + PATCH, n)
+            size += 1
+            while head < size < end:
+                x = free_neighbour(ring, order[head], placed)
+                if x < 0:
+                    head += 1
+                else:
+                    order[size], placed[x] = x, True
+                    size += 1
+            start = -1
+            while beside < size and start < 0:
+                start = free_neighbour(ring, order[beside], placed)
+                beside += start < 0
+    return order
+
+
+@kernel
+def renumbered(ring, order):
+    """Rings in another order, their vertices numbered by place in it; and the places."""
+    place = np.empty(order.size, np.int32)
+    for k in range(order.size):
+        place[order[k]] = k
+    moved = np.empty_like(ring)
+    for k in range(order.size):
+        v = order[k]
+        moved[k, 0] = -1
+        if ring[v, 0] >= 0:
+            for j in range(8):
+                moved[k, j] = place[ring[v, j]]
+    return moved, place
+
+
+@kernel
+def gather(values, order, ordered, start, stop):
+    """Triples (3 n,) or numbers (n,) in another order: the k-th is number order[k], for start <= k < stop."""
+    if values.size == order.size:
+        for k in range(np.uint64(start), np.uint64(stop)):
+            ordered[k] = values[np.uint64(order[k])]
+    else:
+        for k in range(np.uint64(start), np.uint64(stop)):
+            place(ordered, THREE * k, ONE, triple(values, THREE * np.uint64(order[k]), ONE))
