@@ -16,16 +16,19 @@ from quadcurv.io import as_mesh, attach, read, to_pymeshlab, to_pyvista, to_trim
 from quadcurv.kernels.ranges import set_threads
 from quadcurv.mesh import QuadGrid, QuadMesh, Recovery, StaggeredGrid
 from quadcurv.repair import as_grid, duplicate_points, merge_points, pair_triangles
-from quadcurv.schemes import SCHEMES, Curvatures, Fit, Scheme
+from quadcurv.schemes import SCHEMES, Curvatures, Fit, Laplacian, Scheme
 from quadcurv.stencils import CornerTable, Stencils
-from quadcurv.types import MeshError
+from quadcurv.types import MeshError, MeshWarning, PrecisionWarning
 
 __all__ = [
     "SCHEMES",
     "CornerTable",
     "Curvatures",
     "Fit",
+    "Laplacian",
     "MeshError",
+    "MeshWarning",
+    "PrecisionWarning",
     "QuadGrid",
     "QuadMesh",
     "Recovery",

@@ -23,22 +23,22 @@ _FINDINGS = {
     "fans": "vertices where several fans touch, which have no curvature",
     "isolated": "vertices without a face, which have no curvature",
     "cut": "polygon(s) of more than four sides, cut into triangles for schemes of quads",
-    "inside_out": "closed surface whose normals point inward",
-    "non_orientable": "non-orientable mesh, whose mean curvature has no sign: |H| is given",
+    "inside_out": "the mesh is closed and inside out: its normals point inward",
+    "non_orientable": "the mesh is non-orientable: its mean curvature has no sign, |H| is given",
 }
 _WARNED = ("collapsed", "dropped", "double", "turned", "masked", "nonmanifold", "non_orientable")
 
 
 class Finding(NamedTuple):
-    """Something found in a mesh that was mended, or that has no answer: what, how often, where first."""
+    """Something in a mesh that was mended, or that has no answer: what, how often, where first (or "")."""
 
     kind: str
     count: int
     first: str
 
     def __str__(self) -> str:
-        where = f", first {self.first}" if self.first else ""
-        return f"{self.count} {_FINDINGS[self.kind]}{where}"
+        text = _FINDINGS[self.kind]
+        return f"{self.count} {text}, first {self.first}" if self.first else text
 
 
 class Report:
@@ -212,7 +212,10 @@ def _hidden(points: Any, mask: ArrayLike | None) -> Bools | None:
 
 def _without_position(points: Any) -> Bools | None:
     """(r, c) where a coordinate is NaN; None of what is no grid of floats or has no such point."""
-    array = np.asarray(points)
+    try:
+        array = np.asarray(points)
+    except (ValueError, OverflowError):  # as in `checked_points`, which says so
+        return None
     if array.ndim != 3 or array.shape[2] != 3 or array.dtype.kind != "f":
         return None
     nan = np.isnan(array).any(axis=2)
@@ -304,7 +307,7 @@ def _from_polygons(faces: Any, n: int) -> GivenFaces:
         if min(polygon) < 0 or max(polygon) >= n:
             raise MeshError(f"faces: face {i} has an index outside 0..{n - 1}: {polygon}")
         if len(set(polygon)) < len(polygon):
-            face = without_repetition(polygon)
+            face = without_repetition(list(polygon))
             if len(face) < 3:
                 dropped[i] = True
                 continue

@@ -48,8 +48,6 @@ class QuadMesh:
         Vertex indices, counter-clockwise. In an (m, 4) array a last entry of -1 marks a triangle.
         A polygon of more than four sides is kept for the schemes that are made for polygons, and cut into
         triangles for the others, the worst of them as good as can be.
-    recovery : Recovery, optional
-        How the quads were found, where they come from triangles.
 
     Attributes
     ----------
@@ -57,6 +55,7 @@ class QuadMesh:
     connectivity : Connectivity
         What does not depend on the positions; meshes made by :meth:`with_points` share it.
     recovery : Recovery or None
+        How the quads were found, where they come from triangles.
     roundoff : float
         Relative rounding error of the positions as they were given, 2^-24 for float32.
 
@@ -87,14 +86,12 @@ class QuadMesh:
         self,
         points: ArrayLike,
         faces: ArrayLike | Sequence[Sequence[int]],
-        *,
-        recovery: Recovery | None = None,
     ) -> None:
         checked = checked_points(points, "points", ("n", 3))
         self.__dict__.update(
             points=checked,
             connectivity=connect(faces, checked),
-            recovery=recovery,
+            recovery=None,
             roundoff=unit_roundoff(points),
         )
         _warn(self.connectivity.findings)
@@ -163,6 +160,10 @@ class QuadMesh:
         follow, as with :meth:`with_points`. Where it would not pay, nothing is done.
         """
         return self._like(connectivity=self.connectivity.reordered())
+
+    def with_recovery(self, recovery: Recovery) -> QuadMesh:
+        """Return the same mesh that knows how its quads were found."""
+        return self._like(recovery=recovery)
 
     def arrays(self) -> dict[str, Floats]:
         """Arrays of positions by name, which results must not overlap."""
@@ -470,10 +471,9 @@ def _refuse_repetition(points: Floats, axis: int, name: str) -> None:
     with np.errstate(invalid="ignore"):
         first, last, second = (points.take(k, axis) for k in (0, -1, 1))
         gap, step = np.abs(first - last), np.abs(second - first)
-    if not np.isfinite(gap).any():
-        return
-    # Beside the next row, so that a grid of many rows far from the origin is not taken for one of these.
-    if np.nanmax(gap) <= _SEAM * max(np.nanmax(step), np.finfo(float).tiny):
+    known = np.isfinite(gap)
+    # Files in single precision, and grids far from the origin, repeat a row to some digits only.
+    if known.any() and gap[known].max() <= 1e-3 * np.nanmax(step, initial=0.0) > 0:
         raise MeshError(
             f"wrap: the last of the {name} repeats the first one, which follows it where the grid wraps: "
             f"leave it out, as points{'[:-1]' if axis == 0 else '[:, :-1]'} does"

@@ -143,8 +143,7 @@ def pair_triangles(mesh: QuadMesh) -> QuadMesh:
     faces[np.minimum(f, g)[chosen]] = quads[chosen]
     paired = QuadMesh(mesh.points, np.delete(faces, np.maximum(f, g)[chosen], axis=0))
     n_triangles = int(np.count_nonzero(mesh.faces[:, 3] < 0))
-    paired.recovery = Recovery("shape", 2 * len(chosen) / max(n_triangles, 1))
-    return paired
+    return paired.with_recovery(Recovery("shape", 2 * len(chosen) / max(n_triangles, 1)))
 
 
 def _least_sine(quads: Floats) -> Floats:

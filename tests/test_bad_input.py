@@ -13,12 +13,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import quadcurv as qc
-from quadcurv import SCHEMES, MeshError, QuadGrid, QuadMesh, Scheme, StaggeredGrid, surfaces
+from quadcurv import SCHEMES, Laplacian, MeshError, MeshWarning, QuadGrid, QuadMesh, StaggeredGrid, surfaces
 from quadcurv.boundary import OPEN, boundary_treatment, roughness
 from quadcurv.comparison import compare
 from quadcurv.quality import quality, summary
 
-LAPLACIANS = [name for name, scheme in SCHEMES.items() if isinstance(scheme, Scheme)]
+LAPLACIANS = [name for name, scheme in SCHEMES.items() if isinstance(scheme, Laplacian)]
 every_scheme = pytest.mark.parametrize("scheme", SCHEMES)
 every_laplacian = pytest.mark.parametrize("scheme", LAPLACIANS)
 
@@ -119,19 +119,9 @@ BAD_FACES = {
         r"faces: face 1 has an index outside 0..5: \[0, 1, 2, 3, 9\]",
     ),
     "negative in a pentagon": ([[0, 1, 2, 3, -1]], "faces: face 0 has an index outside 0..5"),
-    "repeated": (
-        entry(QUADS, (1, 3), 4),
-        r"faces: 1 face\(s\) with a repeated vertex, first face 1: \[1, 4, 5, 4\]",
-    ),
-    "repeated in a triangle": ([[0, 1, 1]], r"faces: 1 face\(s\) with a repeated vertex, first face 0"),
-    "repeated in a pentagon": ([[0, 1, 2, 3, 0]], r"faces: face 0 has a repeated vertex: \[0, 1, 2, 3, 0\]"),
-    "three on an edge": (
-        [[0, 1, 2, 3], [1, 4, 5, 2], [1, 2, 4]],
-        r"faces: 1 edge\(s\) with more than two faces, first the one from vertex 1 to 2",
-    ),
-    "a quad thrice": (
-        [[0, 1, 2, 3]] * 3,
-        r"faces: 4 edge\(s\) with more than two faces, first .* vertex 0 to 1",
+    "repeated in a triangle": (
+        [[0, 1, 1]],
+        r"faces: none is left of those given: 1 face\(s\) of fewer than three .* first face 0",
     ),
 }
 
@@ -148,6 +138,29 @@ def test_faces_rejected(name):
     faces, match = BAD_FACES[name]
     with pytest.raises(MeshError, match=match):
         QuadMesh(SQUARE, faces)
+
+
+MENDED = {
+    "spike in a quad": (
+        entry(QUADS, (1, 3), 4),
+        r"1 face\(s\) of fewer than three .* left out, first face 1",
+    ),
+    "collapsed quad": (entry(QUADS, (1, 3), 5), r"1 face\(s\) with a repeated vertex, .* first face 1"),
+    "collapsed pentagon": ([[0, 1, 2, 3, 0]], r"1 face\(s\) with a repeated vertex, .* first face 0"),
+    "three on an edge": (
+        [[0, 1, 2, 3], [1, 4, 5, 2], [1, 2, 4]],
+        r"1 edge\(s\) with more than two faces, .* first the one from vertex 1 to 2",
+    ),
+    "a quad thrice": ([[0, 1, 2, 3]] * 3, r"2 face\(s\) given twice, taken once, first face 1"),
+}
+
+
+@pytest.mark.parametrize("name", MENDED)
+def test_faces_mended_and_said(name):
+    faces, match = MENDED[name]
+    with pytest.warns(MeshWarning, match=match):
+        mesh = QuadMesh(SQUARE, faces)
+    assert re.search(match, str(mesh.report))
 
 
 @pytest.mark.parametrize("name", ["two coordinates", "NaN", "text", "huge"])
@@ -300,10 +313,12 @@ def test_nothing_of_the_callers_changes():
     points, faces = bowl(6, 7)
     faces[3] = faces[3][::-1]  # will be turned, in our copy
     before = points.copy(), faces.copy()
-    mesh = QuadMesh(points, faces)
+    with pytest.warns(MeshWarning, match=r"1 face\(s\) turned to agree with their neighbours, first face 3"):
+        mesh = QuadMesh(points, faces)
     assert mesh.report["turned"] == 1
     for scheme in SCHEMES:
-        qc.mean_curvature((points, faces), scheme)
+        with pytest.warns(MeshWarning, match="turned"):
+            qc.mean_curvature((points, faces), scheme)
     quality(mesh), summary(mesh, ["liu"]), mesh.stencils().corner_table
     assert np.array_equal(points, before[0])
     assert np.array_equal(faces, before[1])
@@ -460,10 +475,9 @@ def test_a_sheet_folded_onto_itself(scheme):
 
 @every_laplacian
 def test_the_two_sides_of_one_quad_enclose_nothing(scheme):
-    H = qc.mean_curvature((SQUARE[:4], [[0, 1, 2, 3], [0, 1, 2, 3]]), scheme)
+    H = qc.mean_curvature((SQUARE[:4], [[0, 1, 2, 3], [3, 2, 1, 0]]), scheme)
     assert H.shape == (4,)
     assert not np.isinf(H).any()
-    assert QuadMesh(SQUARE[:4], [[0, 1, 2, 3], [0, 1, 2, 3]]).report["turned"] == 1
 
 
 def test_mixed_orientation_is_mended_by_the_fewest_turns(rng):
@@ -471,7 +485,8 @@ def test_mixed_orientation_is_mended_by_the_fewest_turns(rng):
     turned = rng.permutation(64)[:20]
     mixed = faces.copy()
     mixed[turned] = mixed[turned][:, [0, 3, 2, 1]]
-    mesh = QuadMesh(points, mixed)
+    with pytest.warns(MeshWarning, match=r"20 face\(s\) turned"):
+        mesh = QuadMesh(points, mixed)
     assert mesh.report["turned"] == 20
     assert np.array_equal(mesh.faces, faces)
     assert np.array_equal(qc.mean_curvature(mesh), qc.mean_curvature((points, faces)))
@@ -500,7 +515,7 @@ def rejection_names_the_place():
     try:
         yield
     except ValueError as error:
-        if not re.match(r"(points|faces|wrap|primal|dual): ", str(error)):
+        if not re.match(r"(points|faces|wrap|mask|primal|dual): ", str(error)):
             raise AssertionError("this message names no place") from error
 
 
@@ -657,7 +672,7 @@ def run_everything(mesh, scheme, boundary):
     """Every public verb; what it rejects it rejects with the name of an argument."""
     shape = mesh.stencils().shape
     n = int(np.prod(shape))
-    laplacian = isinstance(SCHEMES[scheme], Scheme)
+    laplacian = isinstance(SCHEMES[scheme], Laplacian)
     verbs = [
         lambda: check(qc.mean_curvature(mesh, scheme, boundary), shape),
         lambda: check(qc.mean_curvature_normal(mesh, scheme, boundary), (*shape, 3)),
@@ -710,7 +725,7 @@ def check_matrix(mesh, scheme):
 def one_warning_is_ours():
     """All others are errors."""
     with warnings.catch_warnings():
-        warnings.filterwarnings("ignore", "the mesh is non-orientable")
+        warnings.simplefilter("ignore", MeshWarning)
         yield
 
 

@@ -7,7 +7,16 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from quadcurv import MeshError, QuadGrid, QuadMesh, StaggeredGrid, mean_curvature, stencils, surfaces
+from quadcurv import (
+    MeshError,
+    MeshWarning,
+    QuadGrid,
+    QuadMesh,
+    StaggeredGrid,
+    mean_curvature,
+    stencils,
+    surfaces,
+)
 
 SQUARE = np.array([(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0)], float)
 
@@ -86,7 +95,8 @@ def test_faces_are_turned_to_agree_and_counted():
     turned = np.array([1, 17, 30, 31])
     faces = mesh.faces.copy()
     faces[turned] = faces[turned][:, [0, 3, 2, 1]]
-    again = QuadMesh(mesh.points, faces)
+    with pytest.warns(MeshWarning, match=r"4 face\(s\) turned to agree with their neighbours, first face 1"):
+        again = QuadMesh(mesh.points, faces)
     assert again.report["turned"] == 4
     assert np.array_equal(again.faces, mesh.faces)
     assert np.array_equal(faces[turned], mesh.faces[turned][:, [0, 3, 2, 1]])  # the caller's stay
@@ -160,7 +170,8 @@ def test_with_points_keeps_the_faces():
         ),
         (lambda: QuadGrid(np.zeros((4, 4, 3)), (True,)), "wrap: expected two booleans"),
         (lambda: QuadGrid(np.zeros((4, 4, 3)), "no"), "wrap: expected two booleans"),
-        (lambda: QuadGrid(np.full((4, 4, 3), np.nan)), r"16 non-finite point\(s\), first vertex \(0, 0\)"),
+        (lambda: QuadGrid(np.full((4, 4, 3), np.inf)), r"16 non-finite point\(s\), first vertex \(0, 0\)"),
+        (lambda: QuadGrid(np.full((4, 4, 3), np.nan)), "mask: all 16 points are masked"),
         (
             lambda: StaggeredGrid(np.zeros((3, 3, 3)), np.zeros((3, 3, 3))),
             "primal: shape .* does not fit dual",

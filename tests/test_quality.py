@@ -6,11 +6,21 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from quadcurv import SCHEMES, QuadGrid, QuadMesh, Scheme, StaggeredGrid, mean_curvature, read, surfaces
+from quadcurv import (
+    SCHEMES,
+    Laplacian,
+    MeshWarning,
+    QuadGrid,
+    QuadMesh,
+    StaggeredGrid,
+    mean_curvature,
+    read,
+    surfaces,
+)
 from quadcurv.convergence import fitted_rate
 from quadcurv.quality import quality, summary
 
-LAPLACIANS = [name for name, scheme in SCHEMES.items() if isinstance(scheme, Scheme)]
+LAPLACIANS = [name for name, scheme in SCHEMES.items() if isinstance(scheme, Laplacian)]
 CUBE = np.array([(x, y, z) for x in (0, 1) for y in (0, 1) for z in (0, 1)], float)
 CUBE_FACES = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
 
@@ -158,7 +168,9 @@ def test_summary():
         (10, 11, 12, 13),
     ]
     faces[4] = faces[4][::-1]
-    found = summary(QuadMesh(np.vstack((CUBE, roof, apart)), faces), boundary="nan")
+    with pytest.warns(MeshWarning, match=r"1 face\(s\) turned"):
+        mesh = QuadMesh(np.vstack((CUBE, roof, apart)), faces)
+    found = summary(mesh, boundary="nan")
     assert found["vertices"] == 15
     assert found["quads"] == 5
     assert found["triangles"] == 2 + 2 * 3

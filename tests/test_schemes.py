@@ -11,10 +11,10 @@ from scipy.spatial.transform import Rotation
 
 import quadcurv as qc
 from quadcurv import surfaces
-from quadcurv.schemes import SCHEMES, Scheme, as_scheme, cotan
+from quadcurv.schemes import SCHEMES, Laplacian, as_scheme, cotan
 from quadcurv.schemes.cotan import AREAS
 
-LAPLACIANS = [name for name, scheme in SCHEMES.items() if isinstance(scheme, Scheme)]
+LAPLACIANS = [name for name, scheme in SCHEMES.items() if isinstance(scheme, Laplacian)]
 every_scheme = pytest.mark.parametrize("scheme", SCHEMES)
 every_laplacian = pytest.mark.parametrize("scheme", LAPLACIANS)
 

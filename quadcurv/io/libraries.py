@@ -91,7 +91,7 @@ def from_trimesh(mesh: Any, quads: ArrayLike | None = None) -> QuadMesh:
     faces, recovery = _recovered_quads(mesh, triangles) if quads is None else (quads, None)
     result = QuadMesh(np.asarray(mesh.vertices), faces)
     n_quads = int(np.count_nonzero(result.faces[:, 3] >= 0))
-    result.recovery = Recovery(recovery or "given", 2 * n_quads / max(len(triangles), 1))
+    result = result.with_recovery(Recovery(recovery or "given", 2 * n_quads / max(len(triangles), 1)))
     _warn_of_seam(result)
     return result
 
