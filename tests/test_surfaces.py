@@ -11,7 +11,8 @@ import sympy
 from scipy.spatial import cKDTree
 
 from quadcurv import surfaces
-from quadcurv.surfaces import SURFACES
+from quadcurv.surfaces import SURFACES, Surface, as_surface
+from quadcurv.surfaces.differentiation import Jet
 
 EPS = np.finfo(np.float64).eps
 U, V = sympy.symbols("u v", real=True)
@@ -61,6 +62,17 @@ def in_pillow_sector(lower, wide, sign):
     return contains
 
 
+def cyclide(a, d, c):
+    b = sympy.sqrt(a**2 - c**2)
+    s, t = sympy.cos(U), sympy.cos(V)
+    numerators = (
+        d * (c - a * s * t) + b**2 * s,
+        b * sympy.sin(U) * (a - d * t),
+        b * sympy.sin(V) * (c * s - d),
+    )
+    return tuple(x / (a - c * s * t) for x in numerators)
+
+
 LON_LAT = ring(sympy.cos(V), U, sympy.sin(V))
 AXES = {"a": 3.0, "b": 0.5, "c": 1.25}
 SIN, COS, SINH, COSH = sympy.sin, sympy.cos, sympy.sinh, sympy.cosh
@@ -100,6 +112,11 @@ CASES = [
         "torus",
         {"major": 3.0, "minor": 1.25},
         scaled([1.25] * 3, ring(sympy.Rational(12, 5) + COS(V), U, SIN(V))),
+    ),
+    case(
+        "dupin_cyclide",
+        {"major": 2.5, "minor": 1.25, "offset": 0.7},
+        cyclide(sympy.Rational(5, 2), sympy.Rational(5, 4), sympy.Rational(7, 10)),
     ),
     case("catenoid", {"waist": 1.5}, scaled([1.5] * 3, ring(COSH(U), V, U))),
     case("helicoid", {"pitch": 3.0}, ring(U, V, 3 * V / (2 * sympy.pi))),
@@ -225,6 +242,25 @@ def test_curvature_follows_from_the_mapping(surface):
     assert (np.abs(surface.gaussian_curvature(xi, eta) - K) / scale**2).max() < 1e-6
 
 
+def test_curvature_is_that_of_its_own_mapping_differentiated(surface):
+    own = Surface.from_mapping(surface.mapping, surface.domain, surface.wrap)
+    xi, eta = smooth_samples(surface, np.array([1e-3, 1e-3]))
+    np.testing.assert_array_equal(own.mapping(xi, eta), surface.mapping(xi, eta))
+    H, K = surface.mean_curvature(xi, eta), surface.gaussian_curvature(xi, eta)
+    scale = np.abs(H).max() + np.sqrt(np.abs(K).max())
+    np.testing.assert_allclose(own.mean_curvature(xi, eta), H, rtol=1e-10, atol=1e-12 * scale)
+    np.testing.assert_allclose(own.gaussian_curvature(xi, eta), K, rtol=1e-10, atol=1e-12 * scale**2)
+
+
+def test_principal_curvatures_are_the_roots(surface):
+    xi, eta = smooth_samples(surface, np.array([1e-3, 1e-3]))
+    k1, k2 = surface.principal_curvatures(xi, eta)
+    H, K = surface.mean_curvature(xi, eta), surface.gaussian_curvature(xi, eta)
+    assert (k1 >= k2).all()
+    np.testing.assert_allclose((k1 + k2) / 2, H, rtol=1e-14, atol=1e-15)
+    np.testing.assert_allclose(k1 * k2, K, rtol=1e-12, atol=1e-14)
+
+
 def test_fields_are_float64_and_broadcast(surface):
     (xi0, xi1), (eta0, eta1) = surface.domain
     xi, eta = np.linspace(xi0, xi1, 4)[:, None], np.linspace(eta0, eta1, 3)
@@ -272,6 +308,7 @@ def test_registry():
         name
         for name in surfaces.__all__
         if inspect.isfunction(factory := getattr(surfaces, name))
+        and name != "as_surface"
         and factory.__annotations__["return"] == "Surface"
     }
     assert set(SURFACES) == factories
@@ -358,6 +395,12 @@ def test_cylinder_wraps_with_a_periodic_shift_only():
     np.testing.assert_allclose(helical.mapping(np.pi, 1.0), [-2, 0, 1 + np.pi / 3], atol=4 * EPS)
 
 
+def cyclide_normal(xi, eta, a=2.0, c=0.5):
+    """From the centre of the ball of radius d - c cos xi, on the ellipse of the tube's centres."""
+    centres = np.stack((a * np.cos(xi), np.sqrt(a**2 - c**2) * np.sin(xi), 0 * xi), axis=-1)
+    return np.moveaxis(surfaces.dupin_cyclide().mapping(xi, eta) - centres, -1, 0)
+
+
 NORMALS = {
     "plane": lambda xi, eta: (0 * xi, 0, 1),
     "cylinder": lambda xi, eta: (np.cos(xi), np.sin(xi), 0),
@@ -365,6 +408,7 @@ NORMALS = {
     "catenoid": lambda xi, eta: (-np.cos(eta), -np.sin(eta), np.sinh(xi)),
     "helicoid": lambda xi, eta: (np.sin(eta), -np.cos(eta), xi),
     "enneper": lambda xi, eta: (-2 * xi, 2 * eta, 1 - xi**2 - eta**2),
+    "dupin_cyclide": lambda xi, eta: cyclide_normal(xi, eta),
     "henneberg": lambda xi, eta: (-np.cos(eta), np.sin(eta), -np.sinh(xi)),
     "hyperboloid": lambda xi, eta: (np.cos(xi), np.sin(xi), -np.tanh(eta)),
     "elliptic_paraboloid": lambda xi, eta: (-2 * xi, -2 * eta, 1),
@@ -424,3 +468,161 @@ def test_latitude_must_exclude_the_poles(name, latitude):
 def test_torus_must_have_a_hole(minor):
     with pytest.raises(ValueError, match=r"^minor must be less than major, got major=2\.0"):
         surfaces.torus(major=2.0, minor=minor)
+
+
+@pytest.mark.parametrize(("major", "minor", "offset"), [(2.0, 1.0, 1.0), (2.0, 2.0, 0.5), (2.0, 1.0, 3.0)])
+def test_cyclide_must_be_a_ring(major, minor, offset):
+    with pytest.raises(ValueError, match=r"^offset < minor < major must hold, got offset="):
+        surfaces.dupin_cyclide(major, minor, offset)
+
+
+def test_cyclide_without_offset_is_the_torus():
+    xi, eta = np.random.default_rng(1).uniform(-np.pi, np.pi, (2, 50))
+    cyclide, torus = surfaces.dupin_cyclide(3.0, 1.25, 1e-9), surfaces.torus(3.0, 1.25)
+    np.testing.assert_allclose(cyclide.mapping(xi, eta), torus.mapping(xi, eta + np.pi), atol=1e-8)
+    np.testing.assert_allclose(cyclide.mean_curvature(xi, eta), torus.mean_curvature(xi, eta + np.pi), 1e-8)
+
+
+def test_principal_curvatures_of_a_cyclide_and_of_umbilics():
+    xi, eta = np.random.default_rng(1).uniform(-np.pi, np.pi, (2, 50))
+    k1, k2 = surfaces.dupin_cyclide(2.0, 1.0, 0.5).principal_curvatures(xi, eta)
+    np.testing.assert_allclose(k1, 1 / (1 - 0.5 * np.cos(xi)), rtol=1e-14)
+    np.testing.assert_allclose(k2, np.cos(eta) / (np.cos(eta) - 2), rtol=1e-14, atol=1e-15)
+    for radius in np.linspace(0.3, 3, 40):
+        k1, k2 = surfaces.sphere(radius).principal_curvatures(xi, eta)
+        assert (k1 == 1 / radius).all()
+        assert (k2 == 1 / radius).all()
+
+
+def test_surface_by_name():
+    assert as_surface("torus").name == "torus"
+    surface = surfaces.sphere(2.0)
+    assert as_surface(surface) is surface
+    with pytest.raises(ValueError, match=r"^surface: 'donut' is not one of plane, .*, tanh_sheet$"):
+        as_surface("donut")
+    with pytest.raises(TypeError, match=r"expected a name or a Surface .* got int"):
+        as_surface(3)
+
+
+# A mapping of one's own ---------------------------------------------------------------------------
+
+SQUARE = ((-1.0, 1.0), (-1.0, 1.0))
+# Every function with a derivative, on arguments 0.2 < x < 0.8 and 1.2 < y < 1.8.
+ONE = [
+    *("positive", "negative", "deg2rad", "radians", "rad2deg", "degrees", "absolute", "fabs", "square"),
+    *("reciprocal", "sqrt", "cbrt", "exp", "exp2", "expm1", "log", "log2", "log10", "log1p", "sin", "cos"),
+    *("tan", "arcsin", "arccos", "arctan", "sinh", "cosh", "tanh", "arcsinh", "arctanh"),
+]
+TWO = ["add", "subtract", "multiply", "divide", "power", "float_power", "arctan2", "hypot", "maximum"]
+TWO += ["minimum", "copysign", "remainder"]
+FUNCTIONS = {
+    **{name: lambda u, v, name=name: getattr(np, name)(u * v / 2) for name in ONE},
+    "arccosh": lambda u, v: np.arccosh(u + v),
+    **{name: lambda u, v, name=name: getattr(np, name)(u + v**2, 3 * u * v) for name in TWO},
+    "power of a constant": lambda u, v: 2 ** (u * v),
+    "constant power": lambda u, v: (u - v) ** 3 + (u * v) ** -1.5 + (u - v) ** 1 + (u - v) ** 0,
+    "number over": lambda u, v: 1 / (u - 3 * v) - 2,
+    "where": lambda u, v: np.where(u < 0.5, np.sin(u * v), u**2 / v),
+    "remainder of a number": lambda u, v: (7 * u * v) % 2.5,
+}
+
+
+@pytest.mark.parametrize("name", FUNCTIONS)
+def test_derivatives_of_every_function(name):
+    f = FUNCTIONS[name]
+    u, v = np.random.default_rng(4).uniform((0.2, 1.2), (0.8, 1.8), (30, 2)).T
+    one, zero = np.ones(30), np.zeros(30)
+    jet = f(Jet(u, (one, zero), (zero,) * 3), Jet(v, (zero, one), (zero,) * 3))
+    h = 1e-3
+    differences = derivatives(lambda x, y: f(x, y)[..., None], u, v, (h, h))
+    np.testing.assert_allclose(jet.value, f(u, v), rtol=1e-13)
+    found = np.stack(np.broadcast_arrays(*jet.first, *jet.second, u)[:5])
+    expected = np.stack(differences)[..., 0]
+    # differences that step over a jump say nothing: at most a few of the points
+    close = np.isclose(found, expected, rtol=1e-6, atol=1e-7 * np.abs(found).max()).all(axis=0)
+    assert close.mean() > (0.85 if "where" in name or "remainder" in name else 0.99)
+
+
+def test_every_rule_is_tested():
+    from quadcurv.surfaces import differentiation
+
+    rules = {f.__name__ for f in (*differentiation._RULES, *differentiation._COMPOSED)}
+    assert rules == {*ONE, *TWO, "arccosh"}
+
+
+@pytest.mark.parametrize(
+    "f",
+    [
+        lambda u, v: (u, v, u**2 - v),
+        lambda u, v: [u, v, u**2 - v],
+        lambda u, v: np.array([u, v, u**2 - v]),
+        lambda u, v: np.stack((u, v, u**2 - v), axis=-1),
+        lambda u, v: np.stack(np.broadcast_arrays(u, v, u**2 - v), axis=-1),
+        lambda u, v: (u + np.zeros_like(u), v * np.ones_like(u), np.where(u > 5, 1.0, u**2 - v)),
+    ],
+)
+def test_a_mapping_in_one_line(f):
+    surface = Surface.from_mapping(f, SQUARE, name="trough")
+    assert (surface.name, surface.wrap, surface.domain) == ("trough", (False, False), SQUARE)
+    u, v = np.random.default_rng(4).uniform(-1, 1, (2, 3))  # as many as components
+    assert surface.mapping(u, v).shape == (3, 3)
+    np.testing.assert_allclose(surface.mapping(u, v)[:, 2], u**2 - v)
+    np.testing.assert_allclose(surface.mean_curvature(u, v), -2 / (1 + (4 * u**2 + 1)) ** 1.5, rtol=1e-14)
+    assert np.abs(surface.gaussian_curvature(u, v)).max() < 1e-15
+    mesh, xi, eta = surface.sample((6, 5), "staggered")
+    assert np.isfinite(mesh.stencils().points).all()
+    assert surface.mean_curvature(xi[:, :1], eta[:1]).shape == (6, 5)
+
+
+def test_a_constant_component_and_a_singular_point():
+    cone = Surface.from_mapping(lambda u, v: (u * np.cos(v), u * np.sin(v), 0.0), SQUARE)
+    assert np.isnan(cone.mean_curvature(0.0, 0.3))
+    assert cone.mean_curvature(0.5, 0.3) == 0
+    point = Surface.from_mapping(lambda u, v: (1.0, 2.0, 3.0), SQUARE)
+    assert np.isnan(point.gaussian_curvature([0.1, 0.2], 0.3)).all()
+
+
+@pytest.mark.parametrize(
+    ("f", "message"),
+    [
+        (lambda u, v: (u, v, np.sinc(u)), r"^np\.sinc has no derivative here; a mapping may use .*cosh"),
+        (lambda u, v: (u, v, np.spacing(u)), r"^np\.spacing has no derivative here"),
+        (lambda u, v: (u, v, np.clip(u, 0, 1)), r"^np\.clip has no derivative here"),
+        (lambda u, v: (u, v, np.einsum("...,...->...", u, v)), r"^np\.einsum has no derivative here"),
+        (lambda u, v: (u, v, u @ v), "matmul"),
+        (lambda u, v: (u, v, np.multiply(u, v, out=None, where=True)), r"^np\.multiply\("),
+    ],
+)
+def test_a_function_without_derivative_is_named(f, message):
+    with pytest.raises((TypeError, ValueError), match=message):
+        Surface.from_mapping(f, SQUARE)
+
+
+def test_scalar_code_is_explained():
+    import math
+
+    with pytest.raises(TypeError, match=r"np\.sin where math\.sin stands|only .* arrays can be converted"):
+        Surface.from_mapping(lambda u, v: (u, v, math.sin(u)), SQUARE)
+    one, zero = np.ones(()), np.zeros(())
+    with pytest.raises(TypeError, match=r"write np\.sin where math\.sin stands"):
+        math.sin(Jet(one, (one, zero), (zero,) * 3))
+    with pytest.raises(TypeError, match=r"write np\.where\(condition, a, b\) where `if` stands"):
+        bool(Jet(one, (one, zero), (zero,) * 3))
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ((lambda u, v: (u, v), SQUARE), "^f: a position has three components .* got 2"),
+        ((lambda u, v: (u, v, 1 / u), SQUARE), r"^f: not finite at the middle of the domain, \(0\.0, 0\.0\)"),
+        ((lambda u, v: (u, v, u), ((0, 1), (2, 2))), "^domain: expected two increasing, finite intervals"),
+        ((lambda u, v: (u, v, u), ((0, np.inf), (2, 3))), "^domain: expected two increasing"),
+        ((lambda u, v: (u, v, u), (0, 1)), r"^domain: expected \(\(u0, u1\), \(v0, v1\)\), got"),
+        ((lambda u, v: (u, np.cos(np.pi * v), u), SQUARE, (True, True)), "^wrap: f is not periodic in u"),
+        ((lambda u, v: (np.cos(np.pi * u), v, v**3), SQUARE, (True, True)), "^wrap: f is not periodic in v"),
+    ],
+)
+@pytest.mark.filterwarnings("ignore:divide by zero")
+def test_bad_mappings_are_refused(arguments, message):
+    with pytest.raises(ValueError, match=message):
+        Surface.from_mapping(*arguments)
