@@ -20,6 +20,13 @@ OPEN, INTERIOR, EXTRAPOLATED = 0, 1, 2
 DEGREE = 4
 
 
+def checked_boundary(boundary: str) -> str:
+    """The treatment of the boundary by name, if there is one of that name."""
+    if boundary not in BOUNDARIES:
+        raise ValueError(f"boundary: expected one of {BOUNDARIES}, got {boundary!r}")
+    return boundary
+
+
 def stencils(mesh: Mesh, boundary: str = "extrapolate") -> Stencils:
     """One-ring stencils of a mesh, its boundary treated.
 
@@ -59,8 +66,7 @@ def stencils(mesh: Mesh, boundary: str = "extrapolate") -> Stencils:
     The extrapolation trusts the strips to be smooth: an error of one position reaches a ghost up to 10
     times as large, that across a corner up to 100 times. :func:`roughness` tells what to expect of it.
     """
-    if boundary not in BOUNDARIES:
-        raise ValueError(f"boundary: expected one of {BOUNDARIES}, got {boundary!r}")
+    checked_boundary(boundary)
     if boundary == "nan":
         return mesh.stencils()
     if isinstance(mesh, QuadMesh):
@@ -187,8 +193,7 @@ def frame(grid: QuadGrid | StaggeredGrid, boundary: str = "extrapolate") -> Fram
     ValueError
         As for :func:`stencils`.
     """
-    if boundary not in BOUNDARIES:
-        raise ValueError(f"boundary: expected one of {BOUNDARIES}, got {boundary!r}")
+    checked_boundary(boundary)
     points = grid.points if isinstance(grid, QuadGrid) else grid.primal
     if isinstance(grid, StaggeredGrid) and grid.has_ghosts:
         points, boundary = points[1:-1, 1:-1], "nan"

@@ -49,7 +49,7 @@ def mean_curvature(
     """
     mesh, scheme = as_mesh(mesh), as_scheme(scheme)
     if isinstance(scheme, Fit):
-        return scheme.curvatures(mesh, boundary).mean
+        return drivers.fit(mesh, scheme, boundary).mean
     return evaluate(mesh, "mean_curvature", scheme=scheme, boundary=boundary)["mean_curvature"]
 
 
@@ -76,7 +76,7 @@ def mean_curvature_normal(
     """
     mesh, scheme = as_mesh(mesh), as_scheme(scheme)
     if isinstance(scheme, Fit):
-        fits = scheme.curvatures(mesh, boundary)
+        fits = drivers.fit(mesh, scheme, boundary)
         return -fits.mean[..., None] * fits.normal
     return evaluate(mesh, "mean_curvature_normal", scheme=scheme, boundary=boundary)["mean_curvature_normal"]
 
@@ -105,7 +105,7 @@ def gaussian_curvature(mesh: Any, scheme: str | Fit = "jet", boundary: str = "ex
     """
     mesh = as_mesh(mesh)
     if scheme != "angle_defect":
-        return _as_fit(scheme).curvatures(mesh, boundary).gaussian
+        return drivers.fit(mesh, _as_fit(scheme), boundary).gaussian
     stencils = with_boundary(mesh, boundary)
     defect, area = angle_defect(stencils)
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -135,7 +135,7 @@ def principal_curvatures(mesh: Any, scheme: str | Fit = "jet", boundary: str = "
     ValueError
         As for :func:`mean_curvature`; a scheme that is no fit.
     """
-    return _as_fit(scheme).curvatures(as_mesh(mesh), boundary)
+    return drivers.fit(as_mesh(mesh), _as_fit(scheme), boundary)
 
 
 def vertex_normals(mesh: Any, boundary: str = "extrapolate") -> Floats:

@@ -9,7 +9,7 @@ import pytest
 from test_boundary import disc, l_shape, shuffled, square, without_unused
 
 import quadcurv as qc
-from quadcurv import surfaces
+from quadcurv import drivers, surfaces
 from quadcurv.convergence import fitted_rate
 from quadcurv.schemes import jet
 
@@ -743,7 +743,7 @@ def test_names_and_orders():
 def test_threads_do_not_change_a_bit():
     mesh, _ = sampled("cubed_ellipsoid", 48, 0.2, "faces")  # 13826 vertices: two chunks
     whole = qc.mean_curvature(mesh, "jet")
-    part = replace(jet(), name="again").curvatures(mesh, "nan").mean
+    part = drivers.fit(mesh, replace(jet(), name="again"), "nan").mean
     assert np.array_equal(whole, part)
 
 

@@ -1,4 +1,4 @@
-"""What runs a scheme on a mesh: the choice between `direct` and `compiled`, and the caller's arrays."""
+"""What runs a scheme on a mesh: `fits`, the choice of `direct` or `compiled`, and the caller's arrays."""
 
 from __future__ import annotations
 
@@ -7,13 +7,14 @@ from collections.abc import Iterable, Mapping
 import numpy as np
 import scipy
 
-from quadcurv.boundary import BOUNDARIES, stencils
+from quadcurv.boundary import checked_boundary, stencils
 from quadcurv.drivers import compiled, direct
+from quadcurv.drivers.fits import fit
 from quadcurv.mesh import Mesh, QuadGrid, QuadMesh
 from quadcurv.schemes import Laplacian
 from quadcurv.types import Floats
 
-__all__ = ["run", "stiffness"]
+__all__ = ["fit", "run", "stiffness"]
 
 
 def run(
@@ -24,8 +25,7 @@ def run(
     out: Mapping[str, Floats] | None = None,
 ) -> dict[str, Floats]:
     """Results by name (see `direct.PER_VERTEX`), into the arrays of `out` where there are any."""
-    if boundary not in BOUNDARIES:
-        raise ValueError(f"boundary: expected one of {BOUNDARIES}, got {boundary!r}")
+    checked_boundary(boundary)
     results = _arrays(mesh, wanted, out or {})
     if isinstance(mesh, QuadGrid) and mesh.mask is not None:
         found = run(mesh.to_mesh(), scheme, results, boundary)

@@ -4,13 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Literal, NamedTuple
+from typing import Literal, NamedTuple, Protocol
 
 import scipy
 
-from quadcurv.mesh import Mesh
 from quadcurv.stencils import Stencils
-from quadcurv.types import Floats, Ints
+from quadcurv.types import Bools, Floats, Indices, Ints
 
 
 @dataclass(frozen=True)
@@ -107,6 +106,57 @@ class Curvatures:
     rings: Ints | None = None
 
 
+class Neighbourhoods(Protocol):
+    """All that a fit sees of a mesh: its vertices and what lies around each, across a smooth border too.
+
+    Attributes
+    ----------
+    present, wanted : (n,) bool
+        Vertices of one fan of faces, open or closed; those of them that want a curvature.
+    """
+
+    @property
+    def present(self) -> Bools: ...  # noqa: D102
+    @property
+    def wanted(self) -> Bools: ...  # noqa: D102
+
+    def polynomials(self, vertices: Indices, degree: int, rings: int, ghosts: bool = True) -> Floats:
+        """Least-squares polynomials of height over the tangent planes of vertices (k,), compiled.
+
+        Returns
+        -------
+        (k, COLUMNS) float64
+            See :mod:`quadcurv.kernels.jet`. With `ghosts` neighbourhoods of up to two rings go on beyond
+            smooth borders; else, and over more rings, they end there.
+        """
+
+    def positions(self, vertices: Indices, rings: int) -> tuple[Floats, Floats]:
+        """Positions around vertices (k,), for fits written in numpy.
+
+        Returns
+        -------
+        positions : (k, m, 3) float64
+            The vertex itself, then those of `rings` rings of faces around it, ghosts beyond smooth
+            borders among them; NaN behind.
+        normals : (k, 3) float64
+            Normals of the rings of faces, of any length.
+        """
+
+    def lattice(self, layers: int) -> Floats:
+        """Positions of a grid relative to one of them, for fits along rows and columns.
+
+        Returns
+        -------
+        (r + 2 layers, c + 2 layers, 3) float64
+            With so many layers around it: the other side, ghosts, or NaN; r c = n.
+
+        Raises
+        ------
+        ValueError
+            The mesh is no grid; fewer points than the extrapolation reads.
+        """
+
+
 @dataclass(frozen=True)
 class Fit:
     """A scheme that fits a surface around every vertex: all curvatures at once, and no matrix.
@@ -114,15 +164,17 @@ class Fit:
     Attributes
     ----------
     name, order, reference
-        As for `Scheme`.
-    curvatures : callable
-        (mesh, boundary) -> Curvatures, boundary as for :func:`quadcurv.stencils`.
+        As for `Laplacian`.
+    fit : callable
+        Neighbourhoods -> Curvatures at all n vertices, arrays (n,) and (n, 3). A driver gives them the mesh's
+        shape, puts NaN at vertices that want none, and takes the side with H >= 0 where no side is the
+        outer one.
     """
 
     name: str
     order: int
     reference: str
-    curvatures: Callable[[Mesh, str], Curvatures]
+    fit: Callable[[Neighbourhoods], Curvatures]
 
 
 Scheme = Laplacian | Fit

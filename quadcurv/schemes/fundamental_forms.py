@@ -5,9 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
-from quadcurv.boundary import BOUNDARIES, ghost_layer
-from quadcurv.mesh import Mesh, QuadGrid, QuadMesh, StaggeredGrid
-from quadcurv.schemes.base import Curvatures, Fit
+from quadcurv.schemes.base import Curvatures, Fit, Neighbourhoods
 from quadcurv.types import Floats
 
 # Central differences by order: weights of the value itself, its first and its second derivative.
@@ -35,7 +33,7 @@ def fundamental_forms(order: int = 2) -> Fit:
     -------
     Fit
         For QuadGrid and StaggeredGrid, of which the cell centres alone are read; without standard errors.
-        Its ``curvatures`` raise a ValueError for other meshes, and where an open direction has too few
+        It raises a ValueError for other meshes, and where an open direction has too few
         points. Not in ``SCHEMES``, which serve every mesh.
 
     Raises
@@ -53,18 +51,12 @@ def fundamental_forms(order: int = 2) -> Fit:
         f"fundamental_forms-{order}",
         order,
         "do Carmo 1976, sections 2-5 and 3-3",
-        lambda mesh, boundary: _curvatures(mesh, boundary, order),
+        lambda around: _curvatures(around, order),
     )
 
 
-def _curvatures(mesh: Mesh, boundary: str, order: int) -> Curvatures:
-    if isinstance(mesh, QuadMesh):
-        raise ValueError("mesh: fundamental forms need a QuadGrid or a StaggeredGrid, got a QuadMesh")
-    if boundary not in BOUNDARIES:
-        raise ValueError(f"boundary: expected one of {BOUNDARIES}, got {boundary!r}")
-    if isinstance(mesh, StaggeredGrid):
-        mesh = QuadGrid(mesh.primal[1:-1, 1:-1] if mesh.has_ghosts else mesh.primal, mesh.wrap)
-    x = _surrounded(mesh, boundary == "extrapolate", order // 2)
+def _curvatures(around: Neighbourhoods, order: int) -> Curvatures:
+    x = around.lattice(order // 2)
 
     def derivative(i: int, j: int) -> Floats:
         along = sliding_window_view(x, order + 1, 0) @ _WEIGHTS[order][i]
@@ -84,29 +76,14 @@ def _curvatures(mesh: Mesh, boundary: str, order: int) -> Curvatures:
     H, half = (a + c) / 2, (a - c) / 2
     root, angle = np.hypot(half, b), np.arctan2(b, half)[..., None] / 2
     return Curvatures(
-        mean=H,
-        gaussian=a * c - b * b,
-        k1=H + root,
-        k2=H - root,
-        direction1=np.cos(angle) * e1 + np.sin(angle) * e2,
-        direction2=np.cos(angle) * e2 - np.sin(angle) * e1,
-        normal=normal,
+        mean=H.ravel(),
+        gaussian=(a * c - b * b).ravel(),
+        k1=(H + root).ravel(),
+        k2=(H - root).ravel(),
+        direction1=(np.cos(angle) * e1 + np.sin(angle) * e2).reshape(-1, 3),
+        direction2=(np.cos(angle) * e2 - np.sin(angle) * e1).reshape(-1, 3),
+        normal=normal.reshape(-1, 3),
     )
-
-
-def _surrounded(grid: QuadGrid, extrapolate: bool, layers: int) -> Floats:
-    """Points with `layers` layers around, NaN where nothing is known, relative to one of them."""
-    x = grid.points - grid.points[0, 0]
-    if extrapolate and not all(grid.wrap):
-        index, ghosts = ghost_layer(x, grid.wrap, 3 + layers, layers)
-        x = np.concatenate((x.reshape(-1, 3), ghosts))[index]
-    for axis, wraps in enumerate(grid.wrap):
-        pad = [(layers, layers) if i == axis else (0, 0) for i in range(3)]
-        if wraps:
-            x = np.pad(x, pad, "wrap")
-        elif not extrapolate:
-            x = np.pad(x, pad, constant_values=np.nan)
-    return x
 
 
 def _dot(x: Floats, y: Floats) -> Floats:

@@ -3,32 +3,25 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
-from quadcurv.boundary import BOUNDARIES, ghosts, with_ghosts
-from quadcurv.mesh import Mesh, QuadGrid, QuadMesh, StaggeredGrid
-from quadcurv.schemes.base import Curvatures, Fit, StandardErrors
-from quadcurv.stencils import Stencils
-from quadcurv.types import Bools, Floats, Ints
+from quadcurv.schemes.base import Curvatures, Fit, Neighbourhoods, StandardErrors
+from quadcurv.types import Bools, Floats, Indices, Ints
 
 # Most that errors in height, of unit mean square, may grow to in the second derivatives, both in units of
 # the neighbourhood's extent: inside 2, 3 and 10 by degree; at the sides of a grid, where rings beyond the
 # least are needed, 5, 30 and 100.
 _CONDITION = {2: 20.0, 3: 60.0, 4: 220.0}
 _GROWTH = 3
-_GHOST_DEGREE, _GHOST_LAYERS = 5, 2
-# Of one fit, in vertices of the finite-volume scheme.
-_WORK = 30
 
 _REFERENCE = "Cazals and Pouget 2005"
 _CANDIDATES = [(d, r) for d in (4, 3, 2) for r in range(2, 9)]
 _SAMPLE, _LEAST_SAMPLE = 3000, 100
 
 # Vertices (k,), degree, rings -> results (k, COLUMNS).
-Run = Callable[[NDArray[np.int64], int, int], Floats]
+Run = Callable[[Indices, int, int], Floats]
 
 
 def jet(degree: int | Literal["auto"] = 4, rings: int | None = None) -> Fit:
@@ -84,29 +77,25 @@ def jet(degree: int | Literal["auto"] = 4, rings: int | None = None) -> Fit:
         name if standard else f"jet-{degree}-{rings}",
         2 if degree < 4 else 4,
         _REFERENCE,
-        lambda mesh, boundary: _curvatures(mesh, boundary, degree, rings),
+        lambda around: _curvatures(around, degree, rings),
     )
 
 
-def _curvatures(mesh: Mesh, boundary: str, degree: int, rings: int) -> Curvatures:
-    if boundary not in BOUNDARIES:
-        raise ValueError(f"boundary: expected one of {BOUNDARIES}, got {boundary!r}")
-    stencils = mesh.stencils()
-    wanted, run = _plain(mesh, stencils)
-    if boundary == "nan":
-        wanted &= stencils.closed
-    elif rings <= _GHOST_LAYERS and not isinstance(mesh, StaggeredGrid):
-        run = _continued(run, stencils, rings)
-    out, degrees, grown = _fits(wanted, run, degree, rings)
-    return _unpacked(out, degrees, grown, stencils.shape, stencils.orientable)
+def _curvatures(around: Neighbourhoods, degree: int, rings: int) -> Curvatures:
+    def run(vertices: Indices, d: int, r: int) -> Floats:
+        return around.polynomials(vertices, d, r, ghosts=r == rings)
+
+    return _unpacked(*_fits(around.wanted, run, degree, rings))
 
 
-def _chosen_curvatures(mesh: Mesh, boundary: str) -> Curvatures:
-    wanted, run = _plain(mesh, mesh.stencils())
-    return _curvatures(mesh, boundary, *_choice(np.flatnonzero(wanted), run))
+def _chosen_curvatures(around: Neighbourhoods) -> Curvatures:
+    def run(vertices: Indices, d: int, r: int) -> Floats:
+        return around.polynomials(vertices, d, r, ghosts=False)
+
+    return _curvatures(around, *_choice(np.flatnonzero(around.present), run))
 
 
-def _choice(vertices: NDArray[np.int64], run: Run) -> tuple[int, int]:
+def _choice(vertices: Indices, run: Run) -> tuple[int, int]:
     """Degree and rings of the least expected error of H, by noise and bias, over a sample of vertices.
 
     With H the mean curvature by a fit and H' that by a quartic over no more rings, H' - H is uncorrelated
@@ -182,157 +171,19 @@ def _fits(wanted: Bools, run: Run, degree: int, rings: int) -> tuple[Floats, Int
     return out, degrees, grown
 
 
-def _unpacked(out: Floats, degree: Ints, rings: Ints, shape: tuple[int, ...], orientable: bool) -> Curvatures:
+def _unpacked(out: Floats, degree: Ints, rings: Ints) -> Curvatures:
     from quadcurv.kernels import jet as kernel
-
-    if not orientable:  # no side is the outer one: that with H >= 0
-        turn = out[:, kernel.MEAN] < 0
-        out[turn] = out[turn][:, kernel.TURNED] * kernel.SIGNS
-
-    def column(k: int) -> Floats:
-        return out[:, k].reshape(shape)
-
-    def vector(columns: slice) -> Floats:
-        return out[:, columns].reshape(*shape, 3)
 
     return Curvatures(
-        mean=column(kernel.MEAN),
-        gaussian=column(kernel.GAUSSIAN),
-        k1=column(kernel.K1),
-        k2=column(kernel.K2),
-        direction1=vector(kernel.DIRECTION1),
-        direction2=vector(kernel.DIRECTION2),
-        normal=vector(kernel.NORMAL),
-        standard_error=StandardErrors(*(column(kernel.ERROR + k) for k in range(4))),
-        noise=column(kernel.SIGMA),
-        degree=degree.reshape(shape),
-        rings=rings.reshape(shape),
+        mean=out[:, kernel.MEAN],
+        gaussian=out[:, kernel.GAUSSIAN],
+        k1=out[:, kernel.K1],
+        k2=out[:, kernel.K2],
+        direction1=out[:, kernel.DIRECTION1],
+        direction2=out[:, kernel.DIRECTION2],
+        normal=out[:, kernel.NORMAL],
+        standard_error=StandardErrors(*(out[:, kernel.ERROR + k] for k in range(4))),
+        noise=out[:, kernel.SIGMA],
+        degree=degree,
+        rings=rings,
     )
-
-
-def _plain(mesh: Mesh, stencils: Stencils) -> tuple[Bools, Run]:
-    """The vertices to fit, and their fits without ghosts."""
-    from quadcurv.kernels import topology
-
-    wanted = np.ones(stencils.n, bool)
-    if isinstance(mesh, QuadMesh):
-        kind = mesh.connectivity.kind
-        wanted = (kind == topology.INTERIOR) | (kind == topology.BOUNDARY)
-    return wanted, _on_grid(mesh, stencils) if isinstance(mesh, QuadGrid) else _on_faces(stencils)
-
-
-def _on_grid(grid: QuadGrid, stencils: Stencils) -> Run:
-    from quadcurv.kernels import jet as kernel
-
-    normals = stencils.ring_areas.reshape(grid.points.shape)
-
-    def run(vertices: NDArray[np.int64], degree: int, rings: int) -> Floats:
-        at = np.stack(np.divmod(vertices, grid.shape[1]), axis=1) + rings
-        points, normal = (_padded(x, grid.wrap, rings) for x in (grid.points, normals))
-        return _run(
-            lambda v, out: kernel.grid_fits(points, normal, v, degree, rings, out), at.astype(np.int32)
-        )
-
-    return run
-
-
-def _padded(values: Floats, wrap: tuple[bool, bool], layers: int) -> Floats:
-    """With layers around: the other side where it wraps, else NaN."""
-    for axis, wraps in enumerate(wrap):
-        pad = [(layers, layers) if x == axis else (0, 0) for x in range(3)]
-        values = np.pad(values, pad, "wrap") if wraps else np.pad(values, pad, constant_values=np.nan)
-    return values
-
-
-def _on_faces(stencils: Stencils) -> Run:
-    from quadcurv.kernels import jet as kernel
-    from quadcurv.kernels import topology
-
-    normals = stencils.ring_areas
-    indptr, corners = topology.corners_by_vertex(stencils.faces, len(stencils.points))
-    # The polygon around a vertex of valence 2 has no area: those of its neighbours will do.
-    flat = np.flatnonzero((np.diff(indptr)[: stencils.n] > 0) & ~normals.any(axis=1))
-    normals = normals.copy() if flat.size else normals
-    for v in flat:
-        around = stencils.faces[corners[indptr[v] : indptr[v + 1]] // 4]
-        around = around[(around >= 0) & (around < stencils.n)]
-        normals[v] = stencils.ring_areas[np.unique(around)].sum(axis=0)
-
-    def run(vertices: NDArray[np.int64], degree: int, rings: int) -> Floats:
-        return _run(
-            lambda v, out: kernel.face_fits(
-                stencils.points,
-                stencils.faces,
-                indptr,
-                corners,
-                normals,
-                stencils.orientable,
-                v,
-                degree,
-                rings,
-                out,
-            ),
-            vertices.astype(np.int32),
-        )
-
-    return run
-
-
-def _continued(run: Run, stencils: Stencils, layers: int) -> Run:
-    """The same fits, save that those over `layers` rings have ghosts where these are complete and smooth."""
-    from quadcurv.kernels import topology
-
-    border = np.flatnonzero(~stencils.closed)
-    if border.size == 0:
-        return run
-    kept, faces = topology.part_around(stencils.faces, border, stencils.n, _GHOST_DEGREE)
-    closed = stencils.closed[kept]
-    part = Stencils(stencils.points[kept], faces, closed.shape, closed, stencils.orientable)
-    layer = ghosts(part, _GHOST_DEGREE, layers)
-    if layer.quads.size == 0:
-        return run
-    ghosted, rough = with_ghosts(part, layer)
-    near = np.arange(rough.size) >= part.n
-    # Ghosts err by some ten times their roughness, one-sided fits by some ten times the turn's third power.
-    bad = rough > _turn(part) ** 3
-    corners = np.where(ghosted.faces < 0, ghosted.faces[:, :1], ghosted.faces)
-    for _ in range(layers):
-        for mark in (near, bad):
-            mark[corners[mark[corners].any(axis=1)]] = True
-        bad[: part.n] |= ~ghosted.closed  # beside these, ghosts are missing
-    chosen = np.flatnonzero((near & ~bad)[: part.n])
-    place = np.full(stencils.n, -1)
-    place[kept[chosen]] = chosen
-    run_with_ghosts = _on_faces(ghosted)
-
-    def continued(vertices: NDArray[np.int64], degree: int, rings: int) -> Floats:
-        out = run(vertices, degree, rings)
-        if rings == layers:
-            at = place[vertices]
-            out[at >= 0] = run_with_ghosts(at[at >= 0], degree, rings)
-        return out
-
-    return continued
-
-
-def _turn(mesh: Stencils) -> float:
-    """Sine of the angle by which the normal turns across a face, on average."""
-    size = np.linalg.norm(mesh.ring_areas, axis=1, keepdims=True)
-    normals = np.divide(mesh.ring_areas, size, out=np.zeros_like(mesh.ring_areas), where=size > 0)
-    ends = normals[mesh.faces[:, 0]], normals[mesh.faces[:, 2]]
-    return float(np.linalg.norm(np.cross(*ends), axis=1).mean())
-
-
-def _run(fits: Callable[[Any, Floats], None], vertices: Any) -> Floats:
-    """Run a kernel over vertices, in ranges by several threads where there are many."""
-    from quadcurv.kernels import jet as kernel
-    from quadcurv.kernels import ranges
-
-    out = np.empty((len(vertices), kernel.COLUMNS))
-    ranges.over(
-        lambda start, stop: fits(vertices[start:stop], out[start:stop]),
-        len(vertices),
-        _WORK * len(vertices),
-        kernel.LANES,
-    )
-    return out
