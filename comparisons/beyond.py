@@ -147,8 +147,8 @@ def extraordinary_map(output: Path) -> str | None:
     cube, exact = cubed(cubed_ellipsoid(), 24)
     ball = icosahedral_sphere(12)
     panels = {
-        "cubed ellipsoid": (cube, np.abs(mean_curvature(cube) - exact)),
-        "icosahedral sphere": (ball, np.abs(mean_curvature(ball) - 1)),
+        "cubed ellipsoid": (cube, np.abs(mean_curvature(cube, "finite_volume") - exact)),
+        "icosahedral sphere": (ball, np.abs(mean_curvature(ball, "finite_volume") - 1)),
     }
     label = "error of $H$ (1/length)"
     return save_maps(output, "beyond_extraordinary_map", panels, label, (-5, -1), (1.0, 0.8, 0.9))

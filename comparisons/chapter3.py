@@ -69,7 +69,7 @@ def shape(surface: Surface, n: int) -> tuple[int, int]:
 def norm_errors(surface: Surface, cells: tuple[int, int]) -> tuple[StaggeredGrid, Array, Array, Array]:
     """Primal/dual grid, absolute errors of kappa = |H n| (3.23), and parameters of its cells."""
     mesh, xi, eta = surface.sample(cells, "staggered")
-    kappa = np.linalg.norm(mean_curvature_normal(mesh), axis=-1)
+    kappa = np.linalg.norm(mean_curvature_normal(mesh, "finite_volume"), axis=-1)
     assert isinstance(mesh, StaggeredGrid)
     return mesh, np.abs(kappa - np.abs(surface.mean_curvature(xi, eta))), xi, eta
 
@@ -77,7 +77,7 @@ def norm_errors(surface: Surface, cells: tuple[int, int]) -> tuple[StaggeredGrid
 def signed_errors(surface: Surface, cells: tuple[int, int]) -> Array:
     """Absolute errors of H = -(H n) . n on the same grid."""
     mesh, xi, eta = surface.sample(cells, "staggered")
-    return np.abs(mean_curvature(mesh) - surface.mean_curvature(xi, eta))
+    return np.abs(mean_curvature(mesh, "finite_volume") - surface.mean_curvature(xi, eta))
 
 
 def one_and_inf(found: list[Array]) -> dict[str, list[float]]:
@@ -497,7 +497,7 @@ def performance(output: Path, quick: bool) -> Results:
         laps = []
         for _ in range(15):
             start = time.perf_counter()
-            mean_curvature_normal(mesh)
+            mean_curvature_normal(mesh, "finite_volume")
             laps.append(time.perf_counter() - start)
         seconds.append(min(laps))
     t = 1e3 * np.array(seconds)
@@ -550,11 +550,11 @@ def slips() -> Results:
             kappa = np.linalg.norm(printed_curvature_normal(primal, dual, slip), axis=-1)
             results[f"{slip or 'corrected'}: error at {n}"] = float(np.abs(kappa - exact).mean())
     mesh, xi, eta = helicoid().sample((64, 64), "staggered")
-    Hn = mean_curvature_normal(mesh)
+    Hn = mean_curvature_normal(mesh, "finite_volume")
     normal = np.stack((np.sin(eta), -np.cos(eta), xi), axis=-1) / np.sqrt(1 + xi**2)[..., None]
     cosine = np.abs(dot(Hn, normal)) / np.linalg.norm(Hn, axis=-1)
     mesh, xi, eta = sphere().sample((64, 32), "staggered")
-    inward = dot(mean_curvature_normal(mesh), sphere().mapping(xi, eta))
+    inward = dot(mean_curvature_normal(mesh, "finite_volume"), sphere().mapping(xi, eta))
     xi, eta = np.mgrid[-1:1:9j, -3:3:9j]
     x, y, z = np.moveaxis(catenoid().mapping(xi, eta), -1, 0)
     return results | {

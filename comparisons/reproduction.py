@@ -41,8 +41,8 @@ def as_face_list() -> float:
     rng = np.random.default_rng(0)
     start = (rng.integers(4, size=(len(faces), 1)) + np.arange(4)) % 4
     shuffled = rng.permutation(np.take_along_axis(faces, start, axis=1))
-    H = mean_curvature(QuadMesh(grid.points.reshape(-1, 3), shuffled))
-    return float(np.abs(H - mean_curvature(grid).ravel()).max())
+    H = mean_curvature(QuadMesh(grid.points.reshape(-1, 3), shuffled), "finite_volume")
+    return float(np.abs(H - mean_curvature(grid, "finite_volume").ravel()).max())
 
 
 def mixed(n: int = 32) -> Results:

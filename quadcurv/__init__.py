@@ -1,62 +1,12 @@
-"""Mean curvature on quad meshes and logically Cartesian grids, with every operator side by side."""
+"""Curvature on quad meshes and logically Cartesian grids, with every operator side by side.
 
-from quadcurv.boundary import boundary_treatment, stencils
-from quadcurv.curvature import (
-    dual_areas,
-    evaluate,
-    gaussian_curvature,
-    mass_matrix,
-    mean_curvature,
-    mean_curvature_normal,
-    principal_curvatures,
-    stiffness_matrix,
-    vertex_normals,
-)
-from quadcurv.io import as_mesh, attach, read, to_pymeshlab, to_pyvista, to_trimesh, write
-from quadcurv.kernels.ranges import set_threads
-from quadcurv.mesh import QuadGrid, QuadMesh, Recovery, StaggeredGrid
-from quadcurv.repair import as_grid, duplicate_points, merge_points, pair_triangles
-from quadcurv.schemes import SCHEMES, Curvatures, Fit, Laplacian, Scheme
-from quadcurv.stencils import CornerTable, Stencils
-from quadcurv.types import MeshError, MeshWarning, PrecisionWarning
+Public names are listed in ``__init__.pyi`` and imported when they are first asked for, so that programs that
+use a part of the package do not wait for the rest.
+"""
 
-__all__ = [
-    "SCHEMES",
-    "CornerTable",
-    "Curvatures",
-    "Fit",
-    "Laplacian",
-    "MeshError",
-    "MeshWarning",
-    "PrecisionWarning",
-    "QuadGrid",
-    "QuadMesh",
-    "Recovery",
-    "Scheme",
-    "StaggeredGrid",
-    "Stencils",
-    "as_grid",
-    "as_mesh",
-    "attach",
-    "boundary_treatment",
-    "dual_areas",
-    "duplicate_points",
-    "evaluate",
-    "gaussian_curvature",
-    "mass_matrix",
-    "mean_curvature",
-    "mean_curvature_normal",
-    "merge_points",
-    "pair_triangles",
-    "principal_curvatures",
-    "read",
-    "set_threads",
-    "stencils",
-    "stiffness_matrix",
-    "to_pymeshlab",
-    "to_pyvista",
-    "to_trimesh",
-    "vertex_normals",
-    "write",
-]
+import lazy_loader
+
 __version__ = "0.2.0"
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)
+__all__ += ["__version__"]

@@ -69,6 +69,8 @@ def stencils(mesh: Mesh, boundary: str = "extrapolate") -> Stencils:
     checked_boundary(boundary)
     if boundary == "nan":
         return mesh.stencils()
+    if isinstance(mesh, QuadGrid) and mesh.mask is not None:
+        mesh = mesh.to_mesh()
     if isinstance(mesh, QuadMesh):
         given = mesh.stencils()
         return with_ghosts(given, ghosts(given))[0]

@@ -1,44 +1,138 @@
-"""The public verbs: treat the boundary, run the scheme, divide, give the sign."""
+"""The public verbs: one question each, asked of anything that holds a mesh."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import scipy
+from numpy.typing import ArrayLike
 
 from quadcurv import drivers
 from quadcurv.boundary import stencils as with_boundary
 from quadcurv.io import as_mesh
-from quadcurv.schemes import Curvatures, Fit, Laplacian, Scheme, as_scheme
+from quadcurv.mesh import Mesh, StaggeredGrid
+from quadcurv.precision import warn_of_rounding
+from quadcurv.schemes import Curvatures, Fit, Laplacian, Scheme, SchemeName, as_scheme
 from quadcurv.schemes.angle_defect import angle_defect
 from quadcurv.types import Floats
 
+DEFAULT = "jet"
+"""Scheme of H, K, k1 and k2 where none is named, so that H = (k1 + k2) / 2."""
 
-def mean_curvature(
-    mesh: Any, scheme: str | Scheme = "finite_volume", boundary: str = "extrapolate"
-) -> Floats:
+DEFAULT_MATRIX = "liu"
+"""Scheme of matrices and dual areas where none is named: unlike others it sees a checkerboard."""
+
+
+class PrincipalCurvatures(NamedTuple):
+    """The principal part of :class:`quadcurv.Curvatures`, to be unpacked.
+
+    Attributes
+    ----------
+    k1, k2 : (n,) or (r, c) float64
+        In 1 / length, k1 >= k2.
+    direction1, direction2 : (n, 3) or (r, c, 3) float64
+        Unit tangents.
+    """
+
+    k1: Floats
+    k2: Floats
+    direction1: Floats
+    direction2: Floats
+
+
+def curvatures(mesh: Any, scheme: SchemeName | Fit = DEFAULT, boundary: str = "extrapolate") -> Curvatures:
+    """All that a fit knows at every vertex: H, K, k1, k2, directions, normal, standard errors.
+
+    Parameters
+    ----------
+    mesh : QuadMesh, QuadGrid, StaggeredGrid, trimesh.Trimesh, pyvista.PolyData, path or (points, faces)
+        See :func:`quadcurv.as_mesh`.
+    scheme : str or Fit
+        A fit: "jet" and its kin.
+    boundary : {"extrapolate", "nan"}
+        See :func:`quadcurv.stencils`.
+
+    Returns
+    -------
+    Curvatures
+        ``mean``, ``gaussian``, ``k1``, ``k2`` (n,) or (r, c), signed as :func:`mean_curvature`;
+        ``direction1``, ``direction2``, ``normal`` (n, 3) or (r, c, 3); standard errors. On a
+        non-orientable mesh the side with H >= 0 is taken. NaN as for :func:`mean_curvature`.
+
+    Raises
+    ------
+    MeshError
+        A ValueError: the mesh is not one.
+    ValueError
+        Unknown scheme or boundary; a scheme that is no fit.
+
+    Examples
+    --------
+    >>> import numpy as np, quadcurv as qc
+    >>> ball = qc.surfaces.sphere(radius=2.0).sample((24, 24))[0]
+    >>> found = qc.curvatures(ball)
+    >>> bool(np.abs(found.k1 - 0.5).max() < 1e-3)
+    True
+    """
+    return _fitted(as_mesh(mesh), _as_fit(scheme), boundary)
+
+
+def principal_curvatures(
+    mesh: Any, scheme: SchemeName | Fit = DEFAULT, boundary: str = "extrapolate"
+) -> PrincipalCurvatures:
+    """Principal curvatures k1 >= k2 and their directions, to be unpacked.
+
+    Parameters
+    ----------
+    mesh, scheme, boundary
+        As for :func:`curvatures`, which gives more.
+
+    Returns
+    -------
+    PrincipalCurvatures
+        ``k1, k2, direction1, direction2``; in 1 / length, signed as :func:`mean_curvature`. NaN as there.
+
+    Raises
+    ------
+    ValueError
+        As for :func:`curvatures`.
+
+    Examples
+    --------
+    >>> import numpy as np, quadcurv as qc
+    >>> tube = qc.surfaces.cylinder().sample((24, 12))[0]
+    >>> k1, k2, around, along = qc.principal_curvatures(tube)
+    >>> bool(np.abs(k1 - 1).max() < 1e-3 and np.abs(k2).max() < 1e-3)
+    True
+    """
+    found = curvatures(mesh, scheme, boundary)
+    return PrincipalCurvatures(found.k1, found.k2, found.direction1, found.direction2)
+
+
+def mean_curvature(mesh: Any, scheme: SchemeName | Scheme = DEFAULT, boundary: str = "extrapolate") -> Floats:
     """Mean curvature H = (k1 + k2) / 2 at every vertex.
 
     Parameters
     ----------
     mesh : QuadMesh, QuadGrid, StaggeredGrid, trimesh.Trimesh, pyvista.PolyData, path or (points, faces)
         See :func:`quadcurv.as_mesh`.
-    scheme : str, Scheme or Fit
-        A name in ``quadcurv.SCHEMES``, or one of ``quadcurv.schemes``.
+    scheme : str or Scheme
+        A name in ``quadcurv.schemes.SCHEMES``, or one of :mod:`quadcurv.schemes`. The default is the one a
+        user should take without reading; "finite_volume" is the thesis's.
     boundary : {"extrapolate", "nan"}
         See :func:`quadcurv.stencils`.
 
     Returns
     -------
     (n,) or (r, c) float64
-        In 1 / length, positive where the surface bends away from its normal (+1 / R on a sphere of
-        radius R with outward normals); H = -(H n) . n with n from :func:`vertex_normals`, or a fit's
-        own normal. Without sign
-        on a non-orientable mesh. NaN where the ring is not one closed fan (isolated vertices, boundaries
-        that are not extrapolated, several fans) or degenerate (a face without area; for the cotan formula
-        also half of one).
+        In 1 / length, a density, not integrated over the vertex; positive where the surface bends away
+        from its normal (+1 / R on a sphere of radius R with outward normals); H = -(H n) . n with n from
+        :func:`vertex_normals`, or a fit's own normal. Without sign on a non-orientable mesh. NaN where the
+        ring is not one closed fan (isolated vertices, boundaries that are not extrapolated, several fans,
+        edges of more than two faces) or degenerate (a face without area; for the cotan formula also half
+        of one).
 
     Raises
     ------
@@ -46,15 +140,31 @@ def mean_curvature(
         A ValueError: the mesh is not one.
     ValueError
         Unknown scheme or boundary.
+
+    Warns
+    -----
+    MeshWarning
+        The mesh was mended; see ``mesh.report``.
+    PrecisionWarning
+        The rounding of the positions reaches a hundredth of H.
+
+    Examples
+    --------
+    >>> import numpy as np, quadcurv as qc
+    >>> ball = qc.surfaces.sphere(radius=2.0).sample((24, 24))[0]
+    >>> bool(np.abs(qc.mean_curvature(ball) - 0.5).max() < 1e-3)
+    True
     """
-    mesh, scheme = as_mesh(mesh), as_scheme(scheme)
-    if isinstance(scheme, Fit):
-        return drivers.fit(mesh, scheme, boundary).mean
-    return evaluate(mesh, "mean_curvature", scheme=scheme, boundary=boundary)["mean_curvature"]
+    mesh, chosen = as_mesh(mesh), as_scheme(scheme)
+    if isinstance(chosen, Fit):
+        return _fitted(mesh, chosen, boundary).mean
+    H = drivers.run(mesh, chosen, ["mean_curvature"], boundary)["mean_curvature"]
+    warn_of_rounding(mesh, H)
+    return H
 
 
 def mean_curvature_normal(
-    mesh: Any, scheme: str | Scheme = "finite_volume", boundary: str = "extrapolate"
+    mesh: Any, scheme: SchemeName | Scheme = DEFAULT, boundary: str = "extrapolate"
 ) -> Floats:
     """Mean curvature normal H n, once the mean curvature (half the Laplace-Beltrami of the positions).
 
@@ -73,15 +183,27 @@ def mean_curvature_normal(
     ------
     ValueError
         As for :func:`mean_curvature`.
+
+    Examples
+    --------
+    >>> import numpy as np, quadcurv as qc
+    >>> ball = qc.surfaces.sphere(radius=2.0).sample((24, 24))[0]
+    >>> Hn = qc.mean_curvature_normal(ball, "finite_volume")
+    >>> bool((np.einsum("ijx,ijx->ij", Hn, ball.points) < 0).all())
+    True
     """
-    mesh, scheme = as_mesh(mesh), as_scheme(scheme)
-    if isinstance(scheme, Fit):
-        fits = drivers.fit(mesh, scheme, boundary)
+    mesh, chosen = as_mesh(mesh), as_scheme(scheme)
+    if isinstance(chosen, Fit):
+        fits = _fitted(mesh, chosen, boundary)
         return -fits.mean[..., None] * fits.normal
-    return evaluate(mesh, "mean_curvature_normal", scheme=scheme, boundary=boundary)["mean_curvature_normal"]
+    Hn = drivers.run(mesh, chosen, ["mean_curvature_normal"], boundary)["mean_curvature_normal"]
+    warn_of_rounding(mesh, Hn)
+    return Hn
 
 
-def gaussian_curvature(mesh: Any, scheme: str | Fit = "jet", boundary: str = "extrapolate") -> Floats:
+def gaussian_curvature(
+    mesh: Any, scheme: SchemeName | Fit = DEFAULT, boundary: str = "extrapolate"
+) -> Floats:
     """Gaussian curvature K = k1 k2 at every vertex.
 
     Parameters
@@ -96,46 +218,29 @@ def gaussian_curvature(mesh: Any, scheme: str | Fit = "jet", boundary: str = "ex
     Returns
     -------
     (n,) or (r, c) float64
-        In 1 / length^2. NaN as for :func:`mean_curvature`.
+        In 1 / length^2, a density. NaN as for :func:`mean_curvature`.
 
     Raises
     ------
     ValueError
         As for :func:`mean_curvature`; a scheme that has no Gaussian curvature.
+
+    Examples
+    --------
+    >>> import numpy as np, quadcurv as qc
+    >>> ball = qc.surfaces.sphere(radius=2.0).sample((24, 24))[0]
+    >>> bool(np.abs(qc.gaussian_curvature(ball) - 0.25).max() < 1e-3)
+    True
     """
     mesh = as_mesh(mesh)
-    if scheme != "angle_defect":
-        return drivers.fit(mesh, _as_fit(scheme), boundary).gaussian
+    if not (isinstance(scheme, str) and scheme == "angle_defect"):
+        return _fitted(mesh, _as_fit(scheme), boundary).gaussian
     stencils = with_boundary(mesh, boundary)
     defect, area = angle_defect(stencils)
     with np.errstate(divide="ignore", invalid="ignore"):
         K = defect / area
     K[~stencils.closed | ~np.isfinite(K)] = np.nan
-    return K.reshape(stencils.shape)
-
-
-def principal_curvatures(mesh: Any, scheme: str | Fit = "jet", boundary: str = "extrapolate") -> Curvatures:
-    """Principal curvatures k1 >= k2, their directions, and all else a fit knows.
-
-    Parameters
-    ----------
-    mesh, boundary
-        As for :func:`mean_curvature`.
-    scheme : str or Fit
-
-    Returns
-    -------
-    Curvatures
-        ``k1``, ``k2`` (n,) or (r, c) in 1 / length, signed as the mean curvature; ``direction1``,
-        ``direction2`` and ``normal`` (n, 3) or (r, c, 3); standard errors. On a non-orientable mesh the
-        side with H >= 0 is taken. NaN as for :func:`mean_curvature`.
-
-    Raises
-    ------
-    ValueError
-        As for :func:`mean_curvature`; a scheme that is no fit.
-    """
-    return drivers.fit(as_mesh(mesh), _as_fit(scheme), boundary)
+    return drivers.on_grid(mesh, K) if drivers.has_holes(mesh) else K.reshape(stencils.shape)
 
 
 def vertex_normals(mesh: Any, boundary: str = "extrapolate") -> Floats:
@@ -156,11 +261,18 @@ def vertex_normals(mesh: Any, boundary: str = "extrapolate") -> Floats:
     ------
     ValueError
         As for :func:`mean_curvature`.
+
+    Examples
+    --------
+    >>> import numpy as np, quadcurv as qc
+    >>> ball = qc.surfaces.sphere().sample((24, 24))[0]
+    >>> bool(np.abs(qc.vertex_normals(ball) - ball.points).max() < 0.01)
+    True
     """
     return evaluate(mesh, "vertex_normals", boundary=boundary)["vertex_normals"]
 
 
-def dual_areas(mesh: Any, scheme: str | Scheme = "finite_volume") -> Floats:
+def dual_areas(mesh: Any, scheme: SchemeName | Scheme = DEFAULT_MATRIX) -> Floats:
     """Area that a scheme gives to each vertex: the diagonal of its mass matrix.
 
     Parameters
@@ -172,19 +284,27 @@ def dual_areas(mesh: Any, scheme: str | Scheme = "finite_volume") -> Floats:
     -------
     (n,) or (r, c) float64
         In length^2; 0 at isolated vertices. Boundary vertices have the part inside the mesh. The areas
-        of Liu's formula and of valence 6 add up to the area of the mesh; those of the finite-volume
-        scheme, half the vector area of each ring polygon, do so on quads to second order.
+        of the bilinear element, Liu's formula and valence 6 add up to the area of the mesh; those of the
+        finite-volume scheme, half the vector area of each ring polygon, do so on quads to second order.
+        Of a staggered grid the area of each cell.
 
     Raises
     ------
     ValueError
         As for :func:`mean_curvature`; the scheme is a fit.
+
+    Examples
+    --------
+    >>> import numpy as np, quadcurv as qc
+    >>> ball = qc.surfaces.cubed_sphere().sample((24, 24), "faces")[0]
+    >>> round(float(qc.dual_areas(ball).sum() / np.pi), 2)
+    3.99
     """
     return evaluate(mesh, "dual_areas", scheme=scheme, boundary="nan")["dual_areas"]
 
 
 def stiffness_matrix(
-    mesh: Any, scheme: str | Scheme = "finite_volume", out: scipy.sparse.csr_array | None = None
+    mesh: Any, scheme: SchemeName | Scheme = DEFAULT_MATRIX, out: scipy.sparse.csr_array | None = None
 ) -> scipy.sparse.csr_array:
     """Stiffness matrix S; the Laplace-Beltrami operator is -M^-1 S, and H n = -M^-1 S x / 2.
 
@@ -203,18 +323,26 @@ def stiffness_matrix(
         area. Symmetric positive semi-definite but for cotan of valence 4 and 8, and for finite_volume
         where there are triangles. On quads the finite-volume and Liu's matrix (they are the same) do not
         see a checkerboard: where vertices can be coloured like a chessboard, the alternating mode lies in
-        the null space beside the constants.
+        the null space beside the constants. The bilinear element has no such mode.
         Of a staggered grid (n, p): rows are the n cells, columns the p points of ``stencils().points``.
 
     Raises
     ------
     ValueError
-        As for :func:`mean_curvature`; the scheme is a fit.
+        As for :func:`mean_curvature`; the scheme is a fit; `out` does not fit.
+
+    Examples
+    --------
+    >>> import numpy as np, quadcurv as qc
+    >>> ball = qc.surfaces.cubed_sphere().sample((8, 8), "faces")[0]
+    >>> S = qc.stiffness_matrix(ball)
+    >>> bool(np.abs(S.sum(axis=1)).max() < 1e-12)
+    True
     """
     return drivers.stiffness(as_mesh(mesh), _as_laplacian(scheme), out)
 
 
-def mass_matrix(mesh: Any, scheme: str | Scheme = "finite_volume") -> scipy.sparse.dia_array:
+def mass_matrix(mesh: Any, scheme: SchemeName | Scheme = DEFAULT_MATRIX) -> scipy.sparse.dia_array:
     """Diagonal mass matrix M of a scheme: its :func:`dual_areas`.
 
     Parameters
@@ -230,14 +358,78 @@ def mass_matrix(mesh: Any, scheme: str | Scheme = "finite_volume") -> scipy.spar
     ------
     ValueError
         As for :func:`mean_curvature`; the scheme is a fit.
+
+    Examples
+    --------
+    >>> import quadcurv as qc
+    >>> ball = qc.surfaces.cubed_sphere().sample((8, 8), "faces")[0]
+    >>> qc.mass_matrix(ball).shape
+    (386, 386)
     """
-    return scipy.sparse.diags_array(dual_areas(mesh, scheme).ravel())
+    mesh = as_mesh(mesh)
+    areas = dual_areas(mesh, scheme)
+    return scipy.sparse.diags_array(areas[~mesh.mask] if drivers.has_holes(mesh) else areas.ravel())
+
+
+def laplace_beltrami(mesh: Any, f: ArrayLike, scheme: SchemeName | Scheme = DEFAULT_MATRIX) -> Floats:
+    """Laplace-Beltrami operator of functions at the vertices, -M^-1 S f.
+
+    Parameters
+    ----------
+    mesh, scheme
+        As for :func:`mean_curvature`, but of a Laplacian.
+    f : (n,) or (n, k) array_like
+        One or several functions; of a grid (r, c) or (r, c, k). Of a staggered grid (p,) or (p, k), at
+        the p points of ``stencils().points``: the cells, then the other points.
+
+    Returns
+    -------
+    float64 array of the shape of `f`; of a staggered grid (r, c) or (r, c, k)
+        In units of f / length^2, negative at a maximum. NaN where the ring is not closed: what f is
+        beyond a border nobody knows. Where a weak form is solved, take :func:`stiffness_matrix`, which has
+        natural boundary conditions there.
+
+    Raises
+    ------
+    MeshError
+        A ValueError: the mesh is not one.
+    ValueError
+        The scheme is a fit; `f` does not fit the mesh.
+
+    Examples
+    --------
+    On the unit sphere the coordinates are eigenfunctions with eigenvalue -2.
+
+    >>> import numpy as np, quadcurv as qc
+    >>> ball = qc.surfaces.cubed_sphere().sample((24, 24), "faces")[0]
+    >>> found = qc.laplace_beltrami(ball, ball.points, "liu")
+    >>> bool(np.abs(found + 2 * ball.points).mean() < 0.01)
+    True
+    """
+    mesh, chosen = as_mesh(mesh), _as_laplacian(scheme)
+    stencils = mesh.stencils()
+    given = np.asarray(f, np.float64)
+    if drivers.has_holes(mesh):
+        if given.shape[:2] != mesh.shape:
+            raise ValueError(f"f: shape {given.shape}, expected {mesh.shape} or {(*mesh.shape, 'k')}")
+        return drivers.on_grid(mesh, laplace_beltrami(mesh.to_mesh(), given[~mesh.mask], chosen))
+    lead = (len(stencils.points),) if isinstance(mesh, StaggeredGrid) else stencils.shape
+    if given.shape[: len(lead)] != lead or given.ndim > len(lead) + 1:
+        raise ValueError(f"f: shape {given.shape}, expected {lead} or {(*lead, 'k')}")
+    values = given.reshape(len(stencils.points), *given.shape[len(lead) :])
+    areas = drivers.run(mesh, chosen, ["dual_areas"], "nan")["dual_areas"]
+    result = drivers.stiffness(mesh, chosen) @ (values - values[:1])
+    with np.errstate(divide="ignore", invalid="ignore"):
+        result /= -areas.reshape(-1, *[1] * (values.ndim - 1))
+    result[~stencils.closed] = np.nan
+    result[~np.isfinite(result)] = np.nan
+    return result.reshape(*stencils.shape, *values.shape[1:])
 
 
 def evaluate(
     mesh: Any,
     *wanted: str,
-    scheme: str | Scheme = "finite_volume",
+    scheme: SchemeName | Scheme = "finite_volume",
     boundary: str = "extrapolate",
     out: Mapping[str, Floats] | None = None,
 ) -> dict[str, Floats]:
@@ -245,10 +437,12 @@ def evaluate(
 
     Parameters
     ----------
-    mesh, scheme, boundary
-        As for :func:`mean_curvature`; a fit gives none of these.
+    mesh, boundary
+        As for :func:`mean_curvature`.
     *wanted : {"mean_curvature", "mean_curvature_normal", "vertex_normals", "dual_areas"}
         Names of verbs.
+    scheme : str or Laplacian
+        A fit gives none of these; :func:`curvatures` has what it gives.
     out : mapping from name to float64 array, optional
         C-contiguous arrays of the shape of the result, to be written to. Others are allocated.
 
@@ -260,9 +454,23 @@ def evaluate(
     Raises
     ------
     ValueError
-        As for the verbs; an unknown name; an array in `out` of another shape, type or layout.
+        As for the verbs; an unknown name; an array in `out` of another shape, type or layout, or one that
+        overlaps the mesh or another one.
+
+    Examples
+    --------
+    >>> import quadcurv as qc
+    >>> ball = qc.surfaces.cubed_sphere().sample((8, 8), "faces")[0]
+    >>> sorted(qc.evaluate(ball, "mean_curvature", "dual_areas"))
+    ['dual_areas', 'mean_curvature']
     """
     return drivers.run(as_mesh(mesh), _as_laplacian(scheme), wanted, boundary, out)
+
+
+def _fitted(mesh: Mesh, scheme: Fit, boundary: str) -> Curvatures:
+    found = drivers.fit(mesh, scheme, boundary)
+    warn_of_rounding(mesh, found.mean)
+    return found
 
 
 def _as_laplacian(scheme: str | Scheme) -> Laplacian:

@@ -233,11 +233,11 @@ def test_grids_rejected(make, match):
 def test_arguments_of_verbs_rejected():
     mesh = QuadMesh(*bowl(5, 5))
     with pytest.raises(ValueError, match="boundary: expected one of"):
-        qc.mean_curvature(mesh, boundary="mirror")
+        qc.mean_curvature(mesh, "finite_volume", boundary="mirror")
     with pytest.raises(ValueError, match="scheme: expected one of finite_volume, liu"):
         qc.mean_curvature(mesh, "simplest")
     with pytest.raises(TypeError, match="mesh: expected a quadcurv mesh"):
-        qc.mean_curvature(mesh.points)
+        qc.mean_curvature(mesh.points, "finite_volume")
 
 
 # ---- every layout is the same mesh --------------------------------------------------------------------
@@ -285,9 +285,9 @@ def test_results_do_not_depend_on_the_layout(layout):
     disguised = LAYOUTS[layout](points), LAYOUTS[layout](faces)
     for scheme, H in zip(SCHEMES, expected, strict=True):
         assert np.array_equal(qc.mean_curvature(disguised, scheme), H)
-    grid = qc.mean_curvature(QuadGrid(points.reshape(6, 7, 3)))
+    grid = qc.mean_curvature(QuadGrid(points.reshape(6, 7, 3)), "finite_volume")
     disguised = LAYOUTS[layout](points.reshape(6, 7, 3))
-    assert np.array_equal(qc.mean_curvature(QuadGrid(disguised)), grid)
+    assert np.array_equal(qc.mean_curvature(QuadGrid(disguised), "finite_volume"), grid)
 
 
 @pytest.mark.parametrize(
@@ -297,16 +297,18 @@ def test_results_do_not_depend_on_the_type_of_indices(dtype):
     points, faces = bowl(6, 7)
     mesh = QuadMesh(points, faces.astype(dtype))
     assert mesh.faces.dtype == np.int32
-    assert np.array_equal(qc.mean_curvature(mesh), qc.mean_curvature((points, faces)))
+    assert np.array_equal(
+        qc.mean_curvature(mesh, "finite_volume"), qc.mean_curvature((points, faces), "finite_volume")
+    )
 
 
 @pytest.mark.parametrize("dtype", [np.float16, np.float32, np.longdouble, np.int8, np.uint16, np.int64])
 def test_points_of_other_types_are_the_numbers_they_are(dtype):
     points, faces = bowl(5, 5)
     points = np.round(8 * points + 10).astype(dtype)
-    H = qc.mean_curvature((points, faces))
+    H = qc.mean_curvature((points, faces), "finite_volume")
     assert H.dtype == np.float64
-    assert np.array_equal(H, qc.mean_curvature((points.astype(float), faces)))
+    assert np.array_equal(H, qc.mean_curvature((points.astype(float), faces), "finite_volume"))
 
 
 def test_nothing_of_the_callers_changes():
@@ -460,7 +462,7 @@ def test_seams_of_duplicated_vertices_are_boundaries_and_are_counted():
     )
     mesh = QuadGrid(points).to_mesh()
     assert summary(mesh, [])["coincident"] == 6
-    assert np.isnan(qc.mean_curvature(mesh, boundary="nan").reshape(13, 6)[[0, -1]]).all()
+    assert np.isnan(qc.mean_curvature(mesh, "finite_volume", boundary="nan").reshape(13, 6)[[0, -1]]).all()
     assert summary(QuadGrid(points[:-1], (True, False)), [])["coincident"] == 0
 
 
@@ -489,7 +491,9 @@ def test_mixed_orientation_is_mended_by_the_fewest_turns(rng):
         mesh = QuadMesh(points, mixed)
     assert mesh.report["turned"] == 20
     assert np.array_equal(mesh.faces, faces)
-    assert np.array_equal(qc.mean_curvature(mesh), qc.mean_curvature((points, faces)))
+    assert np.array_equal(
+        qc.mean_curvature(mesh, "finite_volume"), qc.mean_curvature((points, faces), "finite_volume")
+    )
 
 
 @every_scheme

@@ -45,7 +45,7 @@ def test_boundaries(results, surface, none, quadratic, cubic, quartic, inside) -
 
 def test_quartic_ghosts_are_those_of_the_package() -> None:
     grid, xi, eta = tanh_sheet().sample((32, 32))
-    e = np.abs(mean_curvature(grid) - tanh_sheet().mean_curvature(xi, eta))
+    e = np.abs(mean_curvature(grid, "finite_volume") - tanh_sheet().mean_curvature(xi, eta))
     border = np.ones(grid.shape, bool)
     border[1:-1, 1:-1] = False
     found = beyond.border_errors(tanh_sheet(), 32, 4)
@@ -58,7 +58,7 @@ def test_icosahedral_sphere() -> None:
     assert np.bincount(valence).tolist() == [0, 0, 0, 20, len(valence) - 32, 12]
     assert len(mesh.points) - 2 * len(mesh.faces) + len(mesh.faces) == 2
     np.testing.assert_allclose(np.linalg.norm(mesh.points, axis=1), 1, rtol=1e-14)
-    assert mean_curvature(mesh).min() > 0.7  # oriented outward
+    assert mean_curvature(mesh, "finite_volume").min() > 0.7  # oriented outward
 
 
 @pytest.mark.parametrize(

@@ -281,7 +281,7 @@ def test_strips_too_short_stay_open():
     assert np.array_equal(treatment == EXTRAPOLATED, short_end)
     assert np.count_nonzero(treatment == OPEN) == 2 * 17
     with pytest.raises(MeshError, match=r"points: 4 columns, but extrapolation .* needs at least 5"):
-        mean_curvature(QuadGrid(flat(four).reshape(17, 4, 3)))
+        mean_curvature(QuadGrid(flat(four).reshape(17, 4, 3)), "finite_volume")
 
 
 def test_a_triangle_at_the_boundary_opens_its_own_vertices_and_their_neighbours():
@@ -328,7 +328,7 @@ def test_boundaries_can_be_left_open():
     uv, faces = square(4)
     mesh = QuadMesh(flat(uv), faces)
     inside = (np.abs(uv) < 1).all(axis=1)
-    assert np.array_equal(np.isnan(mean_curvature(mesh, boundary="nan")), ~inside)
+    assert np.array_equal(np.isnan(mean_curvature(mesh, "finite_volume", boundary="nan")), ~inside)
     assert np.array_equal(boundary_treatment(mesh, "nan"), np.where(inside, INTERIOR, OPEN))
     with pytest.raises(ValueError, match="boundary: expected one of"):
         stencils(mesh, "mirror")
@@ -340,7 +340,7 @@ def test_the_real_strip(shared_meshes):
     with pytest.warns(UserWarning, match="non-orientable"):
         mesh = read(shared_meshes / "moebius.obj")
     assert np.bincount(boundary_treatment(mesh)).tolist() == [0, 168, 112]
-    assert np.isfinite(mean_curvature(mesh)).all()
+    assert np.isfinite(mean_curvature(mesh, "finite_volume")).all()
 
 
 # ---- ghost layers of grids ----------------------------------------------------------------------------

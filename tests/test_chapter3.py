@@ -112,12 +112,14 @@ def test_counted_formulas_give_the_schemes_curvature() -> None:
     mesh, *_ = torus().sample((12, 16), "staggered")
     assert isinstance(mesh, StaggeredGrid)
     primal, dual = mesh.primal[1:-1, 1:-1], mesh.dual[:-1, :-1]
-    Hn = mean_curvature_normal(mesh)
+    Hn = mean_curvature_normal(mesh, "finite_volume")
     for formula in (chapter3.printed_curvature_normal, chapter3.staggered_curvature_normal):
         np.testing.assert_allclose(formula(primal, dual), Hn, atol=1e-12)
     grid, *_ = torus().sample((12, 16))
     np.testing.assert_allclose(
-        chapter3.shared_curvature_normal(grid.points), mean_curvature_normal(grid), atol=1e-12
+        chapter3.shared_curvature_normal(grid.points),
+        mean_curvature_normal(grid, "finite_volume"),
+        atol=1e-12,
     )
     liu = mean_curvature_normal(grid, "liu")
     np.testing.assert_allclose(chapter3.shared_curvature_normal(grid.points, "liu"), liu, atol=1e-12)

@@ -129,7 +129,7 @@ def test_curvature_as_csv(ball, tmp_path):
     for columns, expected in (
         (["x", "y", "z"], mesh.points),
         (["Normals_x", "Normals_y", "Normals_z"], quadcurv.vertex_normals(mesh)),
-        (["mean_curvature"], quadcurv.mean_curvature(mesh)[:, None]),
+        (["mean_curvature"], quadcurv.mean_curvature(mesh, "finite_volume")[:, None]),
         (["valence"], mesh.stencils().valence[:, None]),
     ):
         assert np.array_equal([[float(row[c]) for c in columns] for row in rows], expected)

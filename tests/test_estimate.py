@@ -52,7 +52,7 @@ def test_disagreement_ranks_errors_on_jittered_grids(jitter):
         eta + rng.uniform(-jitter, jitter, xi.shape) * t,
     )
     grid = qc.QuadGrid(surface.mapping(xi, eta), (True, True))
-    error = qc.mean_curvature(grid) - surface.mean_curvature(xi, eta)
+    error = qc.mean_curvature(grid, "finite_volume") - surface.mean_curvature(xi, eta)
     correlation, found = ranked(disagreement(grid), error)
     assert correlation > 0.97
     assert found > 0.9
@@ -79,7 +79,7 @@ def test_richardson_correction_raises_the_order():
     errors = []
     for n in (32, 64, 128):
         grid, xi, eta = surface.sample((n, n))
-        H = qc.mean_curvature(grid) - richardson(grid)
+        H = qc.mean_curvature(grid, "finite_volume") - richardson(grid)
         errors.append(np.abs(H - surface.mean_curvature(xi, eta))[::2, ::2].max())
     assert errors[-1] < 1e-4
     assert fitted_rate((32, 64, 128), errors) > 3.7
@@ -107,7 +107,7 @@ def test_noise_is_estimated_by_the_automatic_fit():
     grid, xi, eta = surface.sample((96, 96))
     noise = np.random.default_rng(3).normal(0, 0.002, grid.points.shape)
     noisy = qc.QuadGrid(grid.points + noise, grid.wrap)
-    error = qc.mean_curvature(noisy) - surface.mean_curvature(xi, eta)
+    error = qc.mean_curvature(noisy, "finite_volume") - surface.mean_curvature(xi, eta)
     assert ranked(disagreement(noisy, reference=jet("auto")), error)[0] > 0.98
     assert ranked(disagreement(noisy, reference="liu"), error)[0] < 0.5
 

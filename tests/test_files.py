@@ -290,12 +290,14 @@ def test_a_nameless_value_or_a_staggered_grid_is_refused(tmp_path, mesh):
 
 
 def test_a_grid_is_written_row_by_row(tmp_path, torus):
-    H = mean_curvature(torus)
+    H = mean_curvature(torus, "finite_volume")
     write(tmp_path / "grid.vtp", torus, {"H": H})
     data = pv.read(tmp_path / "grid.vtp")
     np.testing.assert_array_equal(data.points, torus.points.reshape(-1, 3))
     np.testing.assert_array_equal(data["H"], H.ravel())
-    np.testing.assert_allclose(mean_curvature(data).reshape(torus.shape), H, rtol=0, atol=1e-12)
+    np.testing.assert_allclose(
+        mean_curvature(data, "finite_volume").reshape(torus.shape), H, rtol=0, atol=1e-12
+    )
     with pytest.raises(MeshError, match=r"H: shape \(154,\), expected \(14, 11\)"):
         write(tmp_path / "grid.vtp", torus, {"H": H.ravel()})
 

@@ -214,7 +214,7 @@ def test_genuine_triangles_stay_triangles():
 def test_a_trimesh_is_not_changed(mesh):
     given = trimesh.Trimesh(POINTS, [[0, 1, 4, 3], [2, 6, 7, 5]], process=False)
     before = given.identifier_hash, given.vertices.copy(), given.faces.copy()
-    mean_curvature(given, boundary="nan")
+    mean_curvature(given, "finite_volume", boundary="nan")
     assert given.identifier_hash == before[0]
     np.testing.assert_array_equal(given.faces, before[2])
     given.vertices += 1.0  # not frozen either
@@ -372,7 +372,10 @@ def test_meshlab_both_ways_in_double(meshlab, mesh):
     for found in (as_mesh(meshes), as_mesh(meshes.current_mesh()), qc.as_mesh(meshes)):
         np.testing.assert_array_equal(found.points, POINTS)
         assert [sorted(f) for f in found.faces.tolist()] == [sorted(f) for f in mesh.faces.tolist()]
-    H, ours = mean_curvature(meshes, boundary="nan"), mean_curvature(mesh, boundary="nan")
+    H, ours = (
+        mean_curvature(meshes, "finite_volume", boundary="nan"),
+        mean_curvature(mesh, "finite_volume", boundary="nan"),
+    )
     np.testing.assert_allclose(H, ours, rtol=0, atol=1e-12)
 
 
@@ -403,7 +406,7 @@ def test_without_meshlab_its_extra_is_named(monkeypatch, mesh):
 def test_results_in_trimesh():
     quads = surfaces.torus().sample((8, 6), "faces")[0]
     out = qc.to_trimesh(quads)
-    H, Hn = mean_curvature(out), mean_curvature_normal(out)
+    H, Hn = mean_curvature(out, "finite_volume"), mean_curvature_normal(out, "finite_volume")
     attach(out, "H", H)
     attach(out, "Hn", Hn)
     np.testing.assert_array_equal(out.vertex_attributes["H"], H)
@@ -438,15 +441,15 @@ def test_results_in_pyvista(mesh):
 def test_results_in_structured_grids(rng, wrap):
     grid = QuadGrid(rng.standard_normal((7, 6, 3)), wrap)
     data = qc.to_pyvista(grid)
-    attach(data, "H", mean_curvature(grid))
-    attach(data, "Hn", mean_curvature_normal(grid))
+    attach(data, "H", mean_curvature(grid, "finite_volume"))
+    attach(data, "Hn", mean_curvature_normal(grid, "finite_volume"))
     attach(data, "at", grid.points)
     np.testing.assert_array_equal(data["at"], data.points)
     np.testing.assert_array_equal(data["Hn"].shape, data.points.shape)
     attach(data, "flat", data["H"])
     np.testing.assert_array_equal(data["flat"], data["H"])
     i, j = 4, 3
-    assert data["H"][i + data.dimensions[0] * j] == mean_curvature(grid)[i, j]
+    assert data["H"][i + data.dimensions[0] * j] == mean_curvature(grid, "finite_volume")[i, j]
 
 
 def test_results_in_meshlab(meshlab, mesh):
@@ -508,11 +511,13 @@ def test_the_accessor_of_polydata(mesh):
     quads = surfaces.torus().sample((8, 6), "faces")[0]
     data = qc.to_pyvista(quads)
     before = data.copy()
-    np.testing.assert_array_equal(data.quadcurv.mean_curvature(), mean_curvature(quads))
+    np.testing.assert_array_equal(data.quadcurv.mean_curvature(), mean_curvature(quads, "finite_volume"))
     np.testing.assert_array_equal(
         data.quadcurv.mean_curvature("liu", "nan"), mean_curvature(quads, "liu", "nan")
     )
-    np.testing.assert_array_equal(data.quadcurv.mean_curvature_normal(), mean_curvature_normal(quads))
+    np.testing.assert_array_equal(
+        data.quadcurv.mean_curvature_normal(), mean_curvature_normal(quads, "finite_volume")
+    )
     np.testing.assert_array_equal(data.quadcurv.vertex_normals(), quadcurv.vertex_normals(quads))
     K = quadcurv.gaussian_curvature(quads)
     np.testing.assert_array_equal(data.quadcurv.gaussian_curvature(), K)
@@ -528,7 +533,7 @@ def test_the_accessor_of_polydata(mesh):
 def test_the_accessor_of_structured_grids(torus, axis):
     closed = np.pad(torus.points, [(0, 1), (0, 1), (0, 0)], mode="wrap")
     data = pv.StructuredGrid(*np.moveaxis(np.expand_dims(closed, axis), -1, 0))
-    H, Hn = mean_curvature(torus), mean_curvature_normal(torus)
+    H, Hn = mean_curvature(torus, "finite_volume"), mean_curvature_normal(torus, "finite_volume")
     assert (data.quadcurv.mean_curvature(wrap=(True, True)).reshape(12, 15).T[:14, :11] == H).all()
     found = data.quadcurv.mean_curvature_normal(wrap=(True, True))
     assert (found.reshape(12, 15, 3).swapaxes(0, 1)[:14, :11] == Hn).all()

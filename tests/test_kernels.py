@@ -283,9 +283,9 @@ def test_rejected_arguments():
 
 def test_neither_points_nor_order_nor_type_are_the_callers_problem():
     points = rough((20, 30))
-    H = qc.mean_curvature(QuadGrid(points))
+    H = qc.mean_curvature(QuadGrid(points), "finite_volume")
     for given in (np.asfortranarray(points), np.repeat(points, 2, axis=1)[:, ::2], points.tolist()):
-        np.testing.assert_array_equal(qc.mean_curvature(QuadGrid(given)), H)
+        np.testing.assert_array_equal(qc.mean_curvature(QuadGrid(given), "finite_volume"), H)
 
 
 def test_far_neighbours_are_brought_together(monkeypatch):
@@ -334,9 +334,9 @@ def large_and_serial():
     """Sum of H of a grid large enough for threads, and of the same with one."""
     grid = QuadGrid(rough((600, 500)))
     qc.set_threads(2)
-    two = qc.mean_curvature(grid)
+    two = qc.mean_curvature(grid, "finite_volume")
     qc.set_threads(1)
-    return bool(np.array_equal(two, qc.mean_curvature(grid)))
+    return bool(np.array_equal(two, qc.mean_curvature(grid, "finite_volume")))
 
 
 @pytest.mark.filterwarnings("ignore:.*use of fork:DeprecationWarning")
@@ -346,9 +346,9 @@ def test_after_a_fork_and_from_other_threads():
         assert pool.apply_async(large_and_serial).get(60)
     grid = QuadGrid(rough((600, 500)))
     qc.set_threads(3)
-    H = qc.mean_curvature(grid)
+    H = qc.mean_curvature(grid, "finite_volume")
     with ThreadPoolExecutor(4) as callers:
-        for other in callers.map(lambda _: qc.mean_curvature(grid), range(8)):
+        for other in callers.map(lambda _: qc.mean_curvature(grid, "finite_volume"), range(8)):
             np.testing.assert_array_equal(other, H)
 
 
@@ -358,7 +358,7 @@ def test_inside_dask_workers():
     from distributed import Client, LocalCluster
 
     grid = QuadGrid(rough((600, 500)))
-    H = qc.mean_curvature(grid)
+    H = qc.mean_curvature(grid, "finite_volume")
     cluster = LocalCluster(2, threads_per_worker=2, processes=True, dashboard_address=None)
     with cluster, Client(cluster) as client:
         tasks = [client.submit(qc.mean_curvature, grid, pure=False) for _ in range(8)]
@@ -523,6 +523,6 @@ def test_a_ring_with_a_vertex_twice_is_not_regular():
     mesh = QuadMesh(rough((2, 5)).reshape(-1, 3), quads)
     assert (mesh.connectivity.ring[:, 0] < 0).all()
     same(mesh, "finite_volume", "nan")
-    S = qc.stiffness_matrix(mesh)
+    S = qc.stiffness_matrix(mesh, "finite_volume")
     assert S.has_canonical_format
     assert abs(S - general(mesh.stencils(), "finite_volume")).max() < 1e-13 * abs(S).max()

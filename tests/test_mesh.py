@@ -100,7 +100,7 @@ def test_faces_are_turned_to_agree_and_counted():
     assert again.report["turned"] == 4
     assert np.array_equal(again.faces, mesh.faces)
     assert np.array_equal(faces[turned], mesh.faces[turned][:, [0, 3, 2, 1]])  # the caller's stay
-    assert np.array_equal(mean_curvature(again), mean_curvature(mesh))
+    assert np.array_equal(mean_curvature(again, "finite_volume"), mean_curvature(mesh, "finite_volume"))
 
 
 def moebius(n=24, m=5, turns=1):
@@ -122,12 +122,12 @@ def test_a_moebius_strip_has_curvature_without_sign():
     with pytest.warns(UserWarning, match="non-orientable: its mean curvature has no sign"):
         mesh = QuadMesh(points, faces)
     assert not mesh.orientable
-    H = mean_curvature(mesh, boundary="nan").reshape(24, 6)
+    H = mean_curvature(mesh, "finite_volume", boundary="nan").reshape(24, 6)
     assert (H[:, 1:-1] >= 0).all()
     assert np.isnan(H[:, [0, -1]]).all()
     # The same geometry cut open has a sign and, away from the cut, the same size.
     open_faces = faces[5:-5]
-    cut = np.abs(mean_curvature((points, open_faces), boundary="nan")).reshape(24, 6)
+    cut = np.abs(mean_curvature((points, open_faces), "finite_volume", boundary="nan")).reshape(24, 6)
     assert np.allclose(H[3:-3, 1:-1], cut[3:-3, 1:-1], rtol=1e-12)
 
 
@@ -154,7 +154,9 @@ def test_with_points_keeps_the_faces():
     mesh = surfaces.cubed_sphere().sample((3, 3), "faces")[0]
     moved = mesh.with_points(2 * mesh.points)
     assert moved.faces is mesh.faces
-    assert np.allclose(mean_curvature(moved) * 2, mean_curvature(mesh), rtol=1e-14)
+    assert np.allclose(
+        mean_curvature(moved, "finite_volume") * 2, mean_curvature(mesh, "finite_volume"), rtol=1e-14
+    )
     with pytest.raises(MeshError, match=r"points: shape \(3, 3\), expected \(56, 3\)"):
         mesh.with_points(np.eye(3))
 
@@ -204,7 +206,7 @@ def test_what_grids_reject(make, match):
 
 def test_unknown_boundary_is_rejected():
     with pytest.raises(ValueError, match="boundary: expected one of"):
-        mean_curvature(surfaces.plane().sample((6, 6))[0], boundary="mirror")
+        mean_curvature(surfaces.plane().sample((6, 6))[0], "finite_volume", boundary="mirror")
 
 
 def test_offset_costs_no_more_than_the_rounding_of_the_positions():
@@ -212,6 +214,8 @@ def test_offset_costs_no_more_than_the_rounding_of_the_positions():
     grid = surfaces.elliptic_paraboloid().sample((16, 16))[0]
     shifted = grid.points + 1e6
     near = QuadGrid(shifted - 1e6)  # the same rounded positions, brought back exactly
-    difference = np.abs(mean_curvature(QuadGrid(shifted)) - mean_curvature(near))
+    difference = np.abs(
+        mean_curvature(QuadGrid(shifted), "finite_volume") - mean_curvature(near, "finite_volume")
+    )
     assert difference[1:-1, 1:-1].max() < 1e-12
     assert difference.max() < 1e-6

@@ -38,7 +38,7 @@ def test_operations_are_less_than_half_of_the_thesis():
 
 def test_the_numpy_scheme_is_the_scheme():
     points = performance.torus(24)
-    Hn = qc.mean_curvature_normal(qc.QuadGrid(points, (True, True)))
+    Hn = qc.mean_curvature_normal(qc.QuadGrid(points, (True, True)), "finite_volume")
     np.testing.assert_allclose(performance.numpy_finite_volume(points), Hn, rtol=0, atol=1e-13)
 
 

@@ -231,11 +231,11 @@ def test_duplicate_points_are_found_exactly_or_within_a_tolerance():
 @pytest.mark.parametrize("tolerance", [0.0, 1e-12])
 def test_a_closed_seam_has_the_curvature_of_the_closed_grid(torus, tolerance):
     open_ = QuadMesh(*_with_seam(torus))
-    assert np.isnan(mean_curvature(open_, boundary="nan")).any()
+    assert np.isnan(mean_curvature(open_, "finite_volume", boundary="nan")).any()
     merged, vertex = merge_points(open_, tolerance)
     assert len(merged.points) == torus.points[..., 0].size
-    H = mean_curvature(merged)[vertex].reshape(15, 12)
-    np.testing.assert_allclose(H[:14, :11], mean_curvature(torus), rtol=0, atol=1e-12)
+    H = mean_curvature(merged, "finite_volume")[vertex].reshape(15, 12)
+    np.testing.assert_allclose(H[:14, :11], mean_curvature(torus, "finite_volume"), rtol=0, atol=1e-12)
     np.testing.assert_array_equal(H[-1], H[0])
 
 
@@ -298,7 +298,10 @@ def test_shuffled_grids_are_recognised_and_values_map_both_ways(seed, shape, wra
     assert sorted(zip(found.shape, found.wrap, strict=True)) == sorted(zip(shape, wrap, strict=True))
     np.testing.assert_array_equal(found.points, mesh.points[vertex])
     assert same_faces(vertex.ravel()[found.to_mesh().faces], mesh.faces)
-    on_grid, on_mesh = mean_curvature(found, boundary="nan"), mean_curvature(mesh, boundary="nan")
+    on_grid, on_mesh = (
+        mean_curvature(found, "finite_volume", boundary="nan"),
+        mean_curvature(mesh, "finite_volume", boundary="nan"),
+    )
     np.testing.assert_allclose(on_grid, on_mesh[vertex], rtol=1e-9, atol=1e-9)
     back = np.full(n + 1, np.nan)
     back[vertex] = on_grid
@@ -311,7 +314,12 @@ def test_the_torus_knot_is_a_grid(shared_meshes):
     assert grid.shape == (12, 120)
     assert grid.wrap == (True, True)
     assert np.sort(vertex, axis=None).tolist() == list(range(1440))
-    np.testing.assert_allclose(mean_curvature(grid), mean_curvature(mesh)[vertex], rtol=0, atol=1e-12)
+    np.testing.assert_allclose(
+        mean_curvature(grid, "finite_volume"),
+        mean_curvature(mesh, "finite_volume")[vertex],
+        rtol=0,
+        atol=1e-12,
+    )
 
 
 def twisted_torus(r, c, shift):

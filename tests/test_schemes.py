@@ -282,12 +282,17 @@ def test_staggered_ghosts_given_wrapped_or_extrapolated_agree():
     given, xi, eta = surface.sample((64, 48), "staggered")
     inner, dual = given.primal[1:-1, 1:-1], given.dual
     wrapped = qc.StaggeredGrid(inner, dual, wrap=(True, True))
-    assert relative(qc.mean_curvature(wrapped), qc.mean_curvature(given)) < 1e-12
-    open_sides = qc.mean_curvature(qc.StaggeredGrid(inner, dual))
+    assert (
+        relative(qc.mean_curvature(wrapped, "finite_volume"), qc.mean_curvature(given, "finite_volume"))
+        < 1e-12
+    )
+    open_sides = qc.mean_curvature(qc.StaggeredGrid(inner, dual), "finite_volume")
     exact = surface.mean_curvature(xi, eta)
-    inside = np.abs(qc.mean_curvature(given) - exact).max()
+    inside = np.abs(qc.mean_curvature(given, "finite_volume") - exact).max()
     assert np.abs(open_sides - exact).max() < 2 * inside
-    assert np.isnan(qc.mean_curvature(qc.StaggeredGrid(inner, dual), boundary="nan")).sum() == 2 * (64 + 46)
+    assert np.isnan(
+        qc.mean_curvature(qc.StaggeredGrid(inner, dual), "finite_volume", boundary="nan")
+    ).sum() == 2 * (64 + 46)
 
 
 # ---- matrices ------------------------------------------------------------------------------------------
@@ -337,7 +342,9 @@ def test_laplace_beltrami_of_a_spherical_harmonic():
     for n in (32, 64, 128):
         grid, *_ = surfaces.sphere().sample((2 * n, n))
         z = grid.points[..., 2].ravel()
-        laplacian = -(qc.stiffness_matrix(grid) @ z) / qc.dual_areas(grid).ravel()
+        laplacian = (
+            -(qc.stiffness_matrix(grid, "finite_volume") @ z) / qc.dual_areas(grid, "finite_volume").ravel()
+        )
         errors.append(np.abs(laplacian + 2 * z).reshape(grid.shape)[:, 1:-1].max())
     assert errors[-1] < 2e-3
     assert np.log2(errors[-2] / errors[-1]) > 1.9

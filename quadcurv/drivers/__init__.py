@@ -3,18 +3,30 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
+from typing import TypeGuard
 
 import numpy as np
 import scipy
 
 from quadcurv.boundary import checked_boundary, stencils
-from quadcurv.drivers import compiled, direct
-from quadcurv.drivers.fits import fit
-from quadcurv.mesh import Mesh, QuadGrid, QuadMesh
-from quadcurv.schemes import Laplacian
+from quadcurv.drivers import compiled, direct, fits
+from quadcurv.mesh import Mesh, QuadGrid, QuadMesh, StaggeredGrid
+from quadcurv.schemes import Curvatures, Fit, Laplacian
 from quadcurv.types import Floats
 
-__all__ = ["fit", "run", "stiffness"]
+__all__ = ["fit", "has_holes", "on_grid", "run", "stiffness"]
+
+
+# The quads of a staggered grid cover it twice, once for its cells and once for their corners: so that the
+# dual area of a cell is its area, matrix and areas are twice those of a mesh of these quads.
+_CELLS = 2.0
+
+
+def fit(mesh: Mesh, scheme: Fit, boundary: str = "extrapolate") -> Curvatures:
+    """Curvatures by a fit at every vertex of a mesh, in the shape of its results."""
+    if has_holes(mesh):
+        return fits.each(fits.fit(mesh.to_mesh(), scheme, boundary), lambda values: on_grid(mesh, values))
+    return fits.fit(mesh, scheme, boundary)
 
 
 def run(
@@ -27,17 +39,17 @@ def run(
     """Results by name (see `direct.PER_VERTEX`), into the arrays of `out` where there are any."""
     checked_boundary(boundary)
     results = _arrays(mesh, wanted, out or {})
-    if isinstance(mesh, QuadGrid) and mesh.mask is not None:
-        found = run(mesh.to_mesh(), scheme, results, boundary)
-        for name, values in found.items():
-            results[name].fill(np.nan)
-            results[name][~mesh.mask] = values
+    if has_holes(mesh):
+        for name, values in run(mesh.to_mesh(), scheme, results, boundary).items():
+            results[name][...] = on_grid(mesh, values)
     elif scheme.fast is None:
         direct.evaluate(mesh.stencils(), stencils(mesh, boundary), scheme, results)
     elif isinstance(mesh, QuadMesh):
         compiled.evaluate_faces(mesh, scheme, boundary, results)
     else:
         compiled.evaluate_grid(mesh, scheme, boundary, results)
+    if isinstance(mesh, StaggeredGrid) and "dual_areas" in results:
+        results["dual_areas"] *= _CELLS
     return results
 
 
@@ -46,10 +58,27 @@ def stiffness(
 ) -> scipy.sparse.csr_array:
     """Stiffness matrix without ghosts, NaN wherever it is not finite; `out` is for the fast schemes."""
     if scheme.fast is not None:
-        return compiled.stiffness(mesh.stencils(), scheme, out)
-    if out is not None:
+        matrix = compiled.stiffness(mesh.stencils(), scheme, out)
+    elif out is not None:
         raise ValueError(f"out: {scheme.name} assembles a new matrix each time")
-    return direct.without_infinity(scheme.assemble(mesh.stencils())[0])
+    else:
+        matrix = direct.without_infinity(scheme.assemble(mesh.stencils())[0])
+    if isinstance(mesh, StaggeredGrid):
+        matrix.data *= _CELLS
+    return matrix
+
+
+def has_holes(mesh: Mesh) -> TypeGuard[QuadGrid]:
+    """Whether points of a grid are masked: it is computed as a face list then."""
+    return isinstance(mesh, QuadGrid) and mesh.mask is not None
+
+
+def on_grid(grid: QuadGrid, values: Floats) -> Floats:
+    """Values of the face list of a grid with holes at their places, NaN in the holes."""
+    assert grid.mask is not None
+    placed = np.full((*grid.shape, *values.shape[1:]), np.nan)
+    placed[~grid.mask] = values
+    return placed
 
 
 def _arrays(mesh: Mesh, wanted: Iterable[str], out: Mapping[str, Floats]) -> dict[str, Floats]:

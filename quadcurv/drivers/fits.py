@@ -37,11 +37,11 @@ def fit(mesh: Mesh, scheme: Fit, boundary: str = "extrapolate") -> Curvatures:
         )
     unknown = ~around.wanted
     if unknown.any():
-        found = _each(found, lambda values: _masked(values, unknown))
+        found = each(found, lambda values: _masked(values, unknown))
     if not around.stencils.orientable:  # no side is the outer one: that with H >= 0
         found = _turned(found, found.mean < 0)
     shape = around.stencils.shape
-    return _each(found, lambda values: values.reshape(*shape, *values.shape[1:]))
+    return each(found, lambda values: values.reshape(*shape, *values.shape[1:]))
 
 
 class MeshNeighbourhoods:
@@ -278,7 +278,7 @@ def _over(fits: Callable[[Any, Floats], None], vertices: Ints) -> Floats:
     return out
 
 
-def _each(found: Curvatures, change: Callable[[Any], Any]) -> Curvatures:
+def each(found: Curvatures, change: Callable[[Any], Any]) -> Curvatures:
     """Curvatures with all arrays changed."""
     values = {f.name: getattr(found, f.name) for f in fields(found)}
     for name, value in values.items():

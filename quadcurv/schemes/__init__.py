@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Literal
+
 from quadcurv.schemes.base import Curvatures, Diamond, Fit, Laplacian, Scheme, StandardErrors
 from quadcurv.schemes.cotan import cotan
 from quadcurv.schemes.finite_volume import FINITE_VOLUME
@@ -48,6 +50,26 @@ SCHEMES: dict[str, Scheme] = {
 }
 
 
+SchemeName = Literal[
+    "finite_volume",
+    "liu",
+    "cotan-4",
+    "cotan-6",
+    "cotan-8",
+    "cotan-4-voronoi",
+    "cotan-6-voronoi",
+    "cotan-8-voronoi",
+    "bunge",
+    "de_goes",
+    "alexa_wardetzky",
+    "jet-2",
+    "jet",
+    "jet-auto",
+    "angle_defect",
+]
+"""Names that the verbs take, for completion in editors."""
+
+
 def as_scheme(scheme: str | Scheme) -> Scheme:
     """Return the scheme of that name, or the scheme itself.
 
@@ -58,6 +80,6 @@ def as_scheme(scheme: str | Scheme) -> Scheme:
     """
     if isinstance(scheme, Scheme):
         return scheme
-    if scheme not in SCHEMES:
+    if not isinstance(scheme, str) or scheme not in SCHEMES:
         raise ValueError(f"scheme: expected one of {', '.join(SCHEMES)}, got {scheme!r}")
     return SCHEMES[scheme]

@@ -1,0 +1,27 @@
+from . import curves, schemes, surfaces
+from .boundary import boundary_treatment, stencils
+from .comparison import compare
+from .convergence import convergence
+from .curvature import (
+    curvatures,
+    dual_areas,
+    evaluate,
+    gaussian_curvature,
+    laplace_beltrami,
+    mass_matrix,
+    mean_curvature,
+    mean_curvature_normal,
+    principal_curvatures,
+    stiffness_matrix,
+    vertex_normals,
+)
+from .io import as_mesh, attach, read, to_pymeshlab, to_pyvista, to_trimesh, write
+from .kernels.ranges import set_threads
+from .mesh import QuadGrid, QuadMesh, StaggeredGrid
+from .quality import quality, summary
+from .repair import as_grid, duplicate_points, merge_points, pair_triangles
+from .schemes import SCHEMES, Curvatures, Fit, Laplacian
+from .types import MeshError, MeshWarning, PrecisionWarning
+
+__version__: str
+__all__: list[str]

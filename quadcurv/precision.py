@@ -1,0 +1,78 @@
+"""What the rounding of positions costs: eps |x| / h^2 in a curvature."""
+
+from __future__ import annotations
+
+import warnings
+
+import numpy as np
+
+from quadcurv.mesh import Mesh, QuadGrid, QuadMesh
+from quadcurv.types import Floats, PrecisionWarning
+
+_SAMPLE = 4096  # of the edges, whose lengths are looked at
+_NOTED = 0.01  # of the mean curvature
+
+
+def rounding_error(mesh: Mesh) -> tuple[float, float]:
+    """Error of H that the rounding of positions causes, about, and the extent of the mesh.
+
+    Parameters
+    ----------
+    mesh : QuadMesh, QuadGrid or StaggeredGrid
+
+    Returns
+    -------
+    error : float
+        eps |x| / h^2 in 1 / length: eps is the distance of 1 to the next number of the type given, |x| the
+        largest coordinate, h an edge, shorter than nine in ten. Errors that each coordinate's rounding
+        makes add up to about this at their largest, in schemes that read one ring.
+    extent : float
+        Largest side of the bounding box, in length; both are of a sample of the edges.
+    """
+    begin, end = _edges(mesh)
+    known = np.isfinite(begin).all(axis=1) & np.isfinite(end).all(axis=1)
+    begin, end = begin[known], end[known]
+    length2 = ((end - begin) ** 2).sum(axis=1)
+    length2 = length2[length2 > 0]
+    if length2.size == 0:
+        return 0.0, 0.0
+    largest = max(np.abs(begin).max(), np.abs(end).max())
+    extent = np.ptp(np.concatenate((begin, end)), axis=0).max()
+    return float(2 * mesh.roundoff * largest / np.quantile(length2, 0.1)), float(extent)
+
+
+def warn_of_rounding(mesh: Mesh, H: Floats) -> None:
+    """Warn where rounding reaches a hundredth of the mean curvature, or of 1 / extent where that is larger.
+
+    Warns
+    -----
+    PrecisionWarning
+        With the figure.
+    """
+    error, extent = rounding_error(mesh)
+    if error * extent < _NOTED:  # most meshes: nothing of H needs to be looked at
+        return
+    known = np.abs(H[np.isfinite(H)])
+    typical = max(float(np.median(known)) if known.size else 0.0, 1 / extent)
+    if error >= _NOTED * typical:
+        warnings.warn(
+            f"positions are rounded to {2 * mesh.roundoff:.1e} of their size, which causes errors of about "
+            f"{error:.1g} (1/length) in H, where H is about {typical:.1g}: move the mesh near the origin "
+            "and give double precision, or smooth more",
+            PrecisionWarning,
+            stacklevel=4,
+        )
+
+
+def _edges(mesh: Mesh) -> tuple[Floats, Floats]:
+    """Ends (k, 3) of some edges."""
+    if isinstance(mesh, QuadMesh):
+        faces = mesh.faces[:: len(mesh.faces) // _SAMPLE + 1]
+        return mesh.points[faces[:, [0, 1]].ravel()], mesh.points[faces[:, [1, 2]].ravel()]
+    x = mesh.points if isinstance(mesh, QuadGrid) else mesh.primal
+    r, c = x.shape[:2]
+    i, j = np.unravel_index(np.arange(0, r * c, r * c // _SAMPLE + 1), (r, c))
+    return (
+        np.concatenate((x[np.minimum(i, r - 2), j], x[i, np.minimum(j, c - 2)])),
+        np.concatenate((x[np.minimum(i, r - 2) + 1, j], x[i, np.minimum(j, c - 2) + 1])),
+    )
