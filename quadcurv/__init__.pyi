@@ -1,5 +1,5 @@
 from . import curves, schemes, surfaces
-from .boundary import boundary_treatment, stencils
+from .boundary import boundary_treatment, one_rings
 from .comparison import compare
 from .convergence import convergence
 from .curvature import (

@@ -27,7 +27,7 @@ def checked_boundary(boundary: str) -> str:
     return boundary
 
 
-def stencils(mesh: Mesh, boundary: str = "extrapolate") -> Stencils:
+def one_rings(mesh: Mesh, boundary: str = "extrapolate") -> Stencils:
     """One-ring stencils of a mesh, its boundary treated.
 
     Parameters
@@ -87,7 +87,7 @@ def boundary_treatment(mesh: Mesh, boundary: str = "extrapolate") -> NDArray[np.
     Parameters
     ----------
     mesh, boundary
-        As for :func:`stencils`.
+        As for :func:`one_rings`.
 
     Returns
     -------
@@ -98,11 +98,11 @@ def boundary_treatment(mesh: Mesh, boundary: str = "extrapolate") -> NDArray[np.
     Raises
     ------
     ValueError
-        As for :func:`stencils`.
+        As for :func:`one_rings`.
     """
-    given, treated = mesh.stencils().closed, stencils(mesh, boundary)
+    given, treated = mesh.stencils().closed, one_rings(mesh, boundary)
     treatment = np.where(given, INTERIOR, np.where(treated.closed, EXTRAPOLATED, OPEN))
-    return treatment.astype(np.uint8).reshape(treated.shape)
+    return mesh.in_shape(treatment.astype(np.uint8))
 
 
 def roughness(mesh: Mesh) -> Floats:
@@ -124,14 +124,13 @@ def roughness(mesh: Mesh) -> Floats:
     Raises
     ------
     MeshError
-        As for :func:`stencils`.
+        As for :func:`one_rings`.
     """
     if isinstance(mesh, StaggeredGrid):
         if mesh.has_ghosts:
             return np.zeros(mesh.shape)
         mesh = QuadGrid(mesh.primal, mesh.wrap)
-    ghosted, rough = _roughness(mesh.stencils())
-    return rough.reshape(ghosted.shape)
+    return mesh.in_shape(_roughness(mesh.stencils())[1])
 
 
 def ghost_layer(
@@ -177,14 +176,14 @@ def ghost_layer(
 
 
 def frame(grid: QuadGrid | StaggeredGrid, boundary: str = "extrapolate") -> Frame:
-    """What :func:`stencils` puts around a grid, as rows and columns; NaN where nothing is known.
+    """What :func:`one_rings` puts around a grid, as rows and columns; NaN where nothing is known.
 
     Parameters
     ----------
     grid : QuadGrid or StaggeredGrid
         The ghost cells of a grid that has them are not copied: NaN stands for them.
     boundary
-        As for :func:`stencils`.
+        As for :func:`one_rings`.
 
     Returns
     -------
@@ -193,7 +192,7 @@ def frame(grid: QuadGrid | StaggeredGrid, boundary: str = "extrapolate") -> Fram
     Raises
     ------
     ValueError
-        As for :func:`stencils`.
+        As for :func:`one_rings`.
     """
     checked_boundary(boundary)
     points = grid.points if isinstance(grid, QuadGrid) else grid.primal
@@ -282,7 +281,7 @@ class Ghosts(NamedTuple):
 
 
 def ghosts(mesh: Stencils, degree: int = DEGREE, layers: int = 1) -> Ghosts:
-    """Find ghost quads beyond every boundary edge whose strip is long enough, see :func:`stencils`."""
+    """Find ghost quads beyond every boundary edge whose strip is long enough, see :func:`one_rings`."""
     n = mesh.n
     rails, slot, valence, n_edges = _strips(mesh, degree)
     if len(rails) == 0:

@@ -225,7 +225,7 @@ def compare(
         of the points. Without it schemes are compared with their median,
         two with the first.
     boundary : {"extrapolate", "nan"}
-        See :func:`quadcurv.stencils`.
+        See :func:`quadcurv.one_rings`.
 
     Returns
     -------
@@ -246,16 +246,17 @@ def compare(
         s.name: mean_curvature(mesh, s, boundary)
         for s in progress(chosen, "schemes", weight=stencils.n * len(chosen))
     }
+    areas = dual_areas(mesh, "liu")
     if callable(exact):
-        exact = exact(stencils.points[: stencils.n].reshape(*stencils.shape, 3))
+        exact = exact(mesh.in_shape(stencils.points[: stencils.n]))
     if exact is not None:
         try:
-            exact = np.broadcast_to(np.asarray(exact, np.float64), stencils.shape)
+            exact = np.broadcast_to(np.asarray(exact, np.float64), areas.shape)
         except ValueError:
             raise ValueError(
-                f"exact: shape {np.shape(exact)} does not fit the result's {stencils.shape}"
+                f"exact: shape {np.shape(exact)} does not fit the result's {areas.shape}"
             ) from None
-    return Comparison(mesh, H, exact, dual_areas(mesh, "liu"), stencils.valence.reshape(stencils.shape))
+    return Comparison(mesh, H, exact, areas, mesh.in_shape(stencils.valence))
 
 
 def schemes_of(schemes: str | Scheme | Iterable[str | Scheme]) -> list[Scheme]:

@@ -10,7 +10,7 @@ import scipy
 from numpy.typing import ArrayLike
 
 from quadcurv import drivers
-from quadcurv.boundary import stencils as with_boundary
+from quadcurv.boundary import one_rings
 from quadcurv.io import as_mesh
 from quadcurv.mesh import Mesh, StaggeredGrid
 from quadcurv.precision import warn_of_rounding
@@ -52,7 +52,7 @@ def curvatures(mesh: Any, scheme: SchemeName | Fit = DEFAULT, boundary: str = "e
     scheme : str or Fit
         A fit: "jet" and its kin.
     boundary : {"extrapolate", "nan"}
-        See :func:`quadcurv.stencils`.
+        See :func:`quadcurv.one_rings`.
 
     Returns
     -------
@@ -122,7 +122,7 @@ def mean_curvature(mesh: Any, scheme: SchemeName | Scheme = DEFAULT, boundary: s
         A name in ``quadcurv.schemes.SCHEMES``, or one of :mod:`quadcurv.schemes`. The default is the one a
         user should take without reading; "finite_volume" is the thesis's.
     boundary : {"extrapolate", "nan"}
-        See :func:`quadcurv.stencils`.
+        See :func:`quadcurv.one_rings`.
 
     Returns
     -------
@@ -235,12 +235,12 @@ def gaussian_curvature(
     mesh = as_mesh(mesh)
     if not (isinstance(scheme, str) and scheme == "angle_defect"):
         return _fitted(mesh, _as_fit(scheme), boundary).gaussian
-    stencils = with_boundary(mesh, boundary)
+    stencils = one_rings(mesh, boundary)
     defect, area = angle_defect(stencils)
     with np.errstate(divide="ignore", invalid="ignore"):
         K = defect / area
     K[~stencils.closed | ~np.isfinite(K)] = np.nan
-    return drivers.on_grid(mesh, K) if drivers.has_holes(mesh) else K.reshape(stencils.shape)
+    return mesh.in_shape(K)
 
 
 def vertex_normals(mesh: Any, boundary: str = "extrapolate") -> Floats:
@@ -412,7 +412,7 @@ def laplace_beltrami(mesh: Any, f: ArrayLike, scheme: SchemeName | Scheme = DEFA
     if drivers.has_holes(mesh):
         if given.shape[:2] != mesh.shape:
             raise ValueError(f"f: shape {given.shape}, expected {mesh.shape} or {(*mesh.shape, 'k')}")
-        return drivers.on_grid(mesh, laplace_beltrami(mesh.to_mesh(), given[~mesh.mask], chosen))
+        return mesh.in_shape(laplace_beltrami(mesh.to_mesh(), given[~mesh.mask], chosen))
     lead = (len(stencils.points),) if isinstance(mesh, StaggeredGrid) else stencils.shape
     if given.shape[: len(lead)] != lead or given.ndim > len(lead) + 1:
         raise ValueError(f"f: shape {given.shape}, expected {lead} or {(*lead, 'k')}")

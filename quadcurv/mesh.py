@@ -9,7 +9,7 @@ from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from quadcurv.checks import Finding, Report, checked_points, checked_wrap, masked_points, unit_roundoff
 from quadcurv.connectivity import Connectivity, connect
@@ -161,6 +161,10 @@ class QuadMesh:
         """
         return self._like(connectivity=self.connectivity.reordered())
 
+    def in_shape(self, values: NDArray[Any]) -> NDArray[Any]:
+        """Return values (n, ...) of the vertices that :meth:`stencils` has, in the shape of results."""
+        return values
+
     def with_recovery(self, recovery: Recovery) -> QuadMesh:
         """Return the same mesh that knows how its quads were found."""
         return self._like(recovery=recovery)
@@ -265,6 +269,18 @@ class QuadGrid:
             closed[:, [0, -1]] = False
         return Stencils(self.points.reshape(-1, 3), grid_faces(index), self.shape, closed.ravel())
 
+    def in_shape(self, values: NDArray[Any]) -> NDArray[Any]:
+        """Return values (n, ...) of the vertices that :meth:`stencils` has, in the shape of results.
+
+        Where masked they are NaN, integers 0.
+        """
+        if self.mask is None:
+            return values.reshape(*self.shape, *values.shape[1:])
+        fill = np.nan if values.dtype.kind == "f" else 0
+        placed = np.full((*self.shape, *values.shape[1:]), fill, values.dtype)
+        placed[~self.mask] = values
+        return placed
+
     def arrays(self) -> dict[str, Floats]:
         """Arrays of positions by name, which results must not overlap."""
         return {"points": self.points}
@@ -348,6 +364,10 @@ class StaggeredGrid:
     def report(self) -> Report:
         """Nothing is ever mended in a staggered grid."""
         return Report(())
+
+    def in_shape(self, values: NDArray[Any]) -> NDArray[Any]:
+        """Return values (n, ...) of the vertices that :meth:`stencils` has, in the shape of results."""
+        return values.reshape(*self.shape, *values.shape[1:])
 
     def arrays(self) -> dict[str, Floats]:
         """Arrays of positions by name, which results must not overlap."""

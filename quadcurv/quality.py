@@ -59,8 +59,7 @@ def quality(mesh: Any) -> dict[str, NDArray[Any]]:
         with np.errstate(invalid="ignore"):  # NaN stays
             np.maximum.at(worst, faces[given], of_face[given])
         fields[name] = np.where(valence > 0, worst[: stencils.n], np.nan)
-    fields["roughness"] = roughness(mesh)
-    return {name: values.reshape(stencils.shape) for name, values in fields.items()}
+    return {name: mesh.in_shape(values) for name, values in fields.items()} | {"roughness": roughness(mesh)}
 
 
 def summary(mesh: Any, schemes: Iterable[str] | None = None, boundary: str = "extrapolate") -> dict[str, Any]:

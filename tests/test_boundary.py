@@ -14,7 +14,7 @@ from quadcurv import (
     QuadGrid,
     QuadMesh,
     mean_curvature,
-    stencils,
+    one_rings,
     surfaces,
     vertex_normals,
 )
@@ -121,7 +121,7 @@ def test_a_grid_as_a_shuffled_face_list_has_the_ghosts_of_the_grid(name, scheme,
     assert np.isfinite(H).all()
     assert np.abs(mean_curvature(mesh, scheme) - H).max() < 1e-12 * max(np.abs(H).max(), 1)
     assert np.array_equal(boundary_treatment(mesh), boundary_treatment(grid).ravel()[order])
-    assert len(stencils(mesh).points) == len(stencils(grid).points)
+    assert len(one_rings(mesh).points) == len(one_rings(grid).points)
 
 
 @pytest.mark.parametrize(("degree", "layers"), [(5, 2), (4, 2), (3, 3)])
@@ -169,14 +169,14 @@ def test_ghosts_of_any_part_of_a_grid_continue_it(data):
     mesh = QuadMesh(quartic(i, j).reshape(-1, 3), faces)
     i, j = np.mgrid[-1 : size + 2, -1 : size + 2]
     whole = QuadGrid(quartic(i, j))
-    treated, closed = boundary_treatment(mesh), stencils(mesh).closed
+    treated, closed = boundary_treatment(mesh), one_rings(mesh).closed
     for scheme in ("finite_volume", "liu", "cotan-4", "cotan-6"):
         expected = mean_curvature(whole, scheme, boundary="nan")[1:-1, 1:-1].ravel()
         H = mean_curvature(mesh, scheme)
         assert np.array_equal(np.isfinite(H), closed)
         assert np.abs(H - expected)[closed].max(initial=0) < 1e-9
     # Ghosts make a mesh of their own; its closed rings are the ones that are said to be closed.
-    ghosted = stencils(mesh)
+    ghosted = one_rings(mesh)
     if len(ghosted.points) > len(mesh.points):
         again = QuadMesh(ghosted.points, ghosted.faces)
         assert again.report["turned"] == 0
@@ -331,7 +331,7 @@ def test_boundaries_can_be_left_open():
     assert np.array_equal(np.isnan(mean_curvature(mesh, "finite_volume", boundary="nan")), ~inside)
     assert np.array_equal(boundary_treatment(mesh, "nan"), np.where(inside, INTERIOR, OPEN))
     with pytest.raises(ValueError, match="boundary: expected one of"):
-        stencils(mesh, "mirror")
+        one_rings(mesh, "mirror")
 
 
 def test_the_real_strip(shared_meshes):

@@ -53,7 +53,7 @@ def moebius_strip(r=24, c=7):
 def test_a_fit_in_plain_numpy_sees_what_the_compiled_ones_see(name, boundary, layout):
     grid = surfaces.SURFACES[name]().sample((12, 10), "staggered" if layout == "staggered" else "grid")[0]
     mesh = grid.to_mesh() if layout == "faces" else grid
-    plain, compiled = (qc.principal_curvatures(mesh, s, boundary) for s in (PLAIN, jet(2)))
+    plain, compiled = (qc.curvatures(mesh, s, boundary) for s in (PLAIN, jet(2)))
     assert plain.mean.shape == compiled.mean.shape
     assert plain.normal.shape == (*compiled.mean.shape, 3)
     same = compiled.rings == 1
@@ -82,7 +82,7 @@ def test_where_nothing_is_known_is_nan_whatever_a_fit_says():
     points = np.vstack((grid.points, [(0, 0, 9)]))
     mesh = qc.QuadMesh(points, np.delete(grid.faces, around[[0, 3]], axis=0))
     for boundary in ("extrapolate", "nan"):
-        found = qc.principal_curvatures(mesh, Fit("careless", 0, "", careless), boundary)
+        found = qc.curvatures(mesh, Fit("careless", 0, "", careless), boundary)
         unknown = np.zeros(len(points), bool)
         unknown[[middle, -1]] = True
         if boundary == "nan":
@@ -97,7 +97,7 @@ def test_where_nothing_is_known_is_nan_whatever_a_fit_says():
 
 def test_where_no_side_is_the_outer_one_every_fit_takes_that_of_positive_mean_curvature():
     strip = moebius_strip()
-    fits = qc.principal_curvatures(strip, PLAIN)
+    fits = qc.curvatures(strip, PLAIN)
     assert (fits.mean >= 0).all()
     assert np.abs((fits.k1 + fits.k2) / 2 - fits.mean).max() < 1e-12
     assert np.abs(fits.mean - qc.mean_curvature(strip, jet(2))).max() < 1e-11
@@ -109,8 +109,8 @@ def test_a_mask_cuts_holes_of_the_grids_shape():
     mask[5, 4:7] = mask[0, 0] = True
     masked = qc.QuadGrid(grid.points, mask=mask)
     for scheme in (jet(), PLAIN):
-        fits = qc.principal_curvatures(masked, scheme)
-        expected = qc.principal_curvatures(masked.to_mesh(), scheme)
+        fits = qc.curvatures(masked, scheme)
+        expected = qc.curvatures(masked.to_mesh(), scheme)
         assert np.array_equal(fits.mean[~mask], expected.mean)
         assert np.array_equal(fits.normal[~mask], expected.normal)
         assert np.isnan(fits.mean[mask]).all()

@@ -21,7 +21,7 @@ def test_order_up_to_the_border(name, order, rate, bound, layout):
     errors = []
     for n in (64, 128, 256):
         grid, xi, eta = surface.sample((n, n), layout)
-        fits = qc.principal_curvatures(grid, fundamental_forms(order))
+        fits = qc.curvatures(grid, fundamental_forms(order))
         H, K = surface.mean_curvature(xi, eta), surface.gaussian_curvature(xi, eta)
         errors.append([np.abs(fits.mean - H).max(), np.abs(fits.gaussian - K).max()])
     assert max(errors[-1]) < bound
@@ -37,7 +37,7 @@ def test_polynomial_mappings_are_exact(name, order):
     surface = surfaces.SURFACES[name]()
     for layout in ("grid", "staggered"):
         grid, xi, eta = surface.sample((64, 64), layout)
-        fits = qc.principal_curvatures(grid, fundamental_forms(order))
+        fits = qc.curvatures(grid, fundamental_forms(order))
         assert np.abs(fits.mean - surface.mean_curvature(xi, eta)).max() < 1e-11
         assert np.abs(fits.gaussian - surface.gaussian_curvature(xi, eta)).max() < 1e-11
 
@@ -47,7 +47,7 @@ def test_quadratic_graphs_are_exact(order):
     x, y = np.meshgrid(np.linspace(-1, 1, 9), np.linspace(-1, 1.5, 11), indexing="ij")
     z = 0.3 * x * x - 0.8 * x * y + 0.1 * y * y + 0.2 * x - 0.5 * y
     grid = qc.QuadGrid(np.stack((x, y, z), axis=-1))
-    fits = qc.principal_curvatures(grid, fundamental_forms(order))
+    fits = qc.curvatures(grid, fundamental_forms(order))
     p, q = 0.6 * x - 0.8 * y + 0.2, -0.8 * x + 0.2 * y - 0.5
     W = np.sqrt(1 + p * p + q * q)
     H = -((1 + q * q) * 0.6 + 2 * p * q * 0.8 + (1 + p * p) * 0.2) / (2 * W**3)
@@ -63,9 +63,7 @@ def test_principal_directions_of_a_sheared_torus():
     n = 96
     xi, eta = np.meshgrid(*[2 * np.pi / n * np.arange(n)] * 2, indexing="ij")
     surface = surfaces.torus()
-    fits = qc.principal_curvatures(
-        qc.QuadGrid(surface.mapping(xi + eta, eta), (True, True)), fundamental_forms(4)
-    )
+    fits = qc.curvatures(qc.QuadGrid(surface.mapping(xi + eta, eta), (True, True)), fundamental_forms(4))
     around = np.stack((-np.sin(xi + eta), np.cos(xi + eta), np.zeros_like(xi)), axis=-1)
     assert np.abs(np.einsum("rcx,rcx->rc", fits.direction1, around)).max() < 2e-3
     assert np.abs(np.abs(np.einsum("rcx,rcx->rc", fits.direction2, around)) - 1).max() < 2e-6

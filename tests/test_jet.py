@@ -91,7 +91,7 @@ def test_fit_is_least_squares(mixed, degree, rings):
     # Three rings of the other one are too steep to fit.
     mesh = mixed if rings < 3 else surfaces.elliptic_paraboloid().sample((12, 12))[0].to_mesh()
     mesh = mesh.with_points(mesh.points + rng.normal(0, 0.01, mesh.points.shape))
-    fits = qc.principal_curvatures(mesh, jet(degree, rings))
+    fits = qc.curvatures(mesh, jet(degree, rings))
     checked = 0
     for v in range(0, len(mesh.points), 7):
         if (fits.degree[v], fits.rings[v]) != (degree, rings):
@@ -119,7 +119,7 @@ def test_even_polynomials_are_exact_at_their_apex(degree):
     z = 0.7 * x**2 - 0.4 * x * y - 0.3 * y**2
     if degree == 4:
         z += 2 * x**4 - 3 * x**3 * y + x * y**3 + 4 * y**4
-    fits = qc.principal_curvatures(qc.QuadGrid(np.stack((x, y, z), axis=-1)), jet(degree))
+    fits = qc.curvatures(qc.QuadGrid(np.stack((x, y, z), axis=-1)), jet(degree))
     assert fits.mean[4, 4] == pytest.approx(-(1.4 - 0.6) / 2, abs=1e-12)
     assert fits.gaussian[4, 4] == pytest.approx(1.4 * -0.6 - 0.16, abs=1e-12)
     assert np.abs(fits.normal[4, 4] - [0, 0, 1]).max() < 1e-12
@@ -130,7 +130,7 @@ def test_even_polynomials_are_exact_at_their_apex(degree):
 
 
 def test_curvatures_agree_with_each_other(torus):
-    fits = qc.principal_curvatures(torus)
+    fits = qc.curvatures(torus)
     assert np.abs((fits.k1 + fits.k2) / 2 - fits.mean).max() < 1e-13
     assert np.abs(fits.k1 * fits.k2 - fits.gaussian).max() < 1e-12
     assert (fits.k1 >= fits.k2).all()
@@ -228,7 +228,7 @@ def test_gaussian_and_principal_curvatures_converge():
     errors = []
     for n in (64, 128, 256):
         grid, xi, eta = surface.sample((n, n))
-        fits = qc.principal_curvatures(grid)
+        fits = qc.curvatures(grid)
         k2 = np.cos(eta) / (2 + np.cos(eta))
         errors.append(
             [
@@ -261,7 +261,7 @@ def test_principal_directions_are_second_order(jitter):
     for n in (16, 32, 64):
         mesh, _ = sampled("cubed_ellipsoid", n, jitter, "faces")
         k1, k2, d1, d2 = principal_frame(mesh.points, AXES)
-        fits = qc.principal_curvatures(mesh)
+        fits = qc.curvatures(mesh)
         apart = k1 - k2 > 0.15
         assert apart.mean() > 0.6
         sine = [
@@ -336,7 +336,7 @@ def test_face_lists_have_the_borders_of_grids(name, scheme, rng):
     H = qc.mean_curvature(grid, scheme)
     assert np.abs(on_faces(grid, scheme, rng) - H).max() < 1e-11
     assert np.abs(H - exact).max() < 0.1
-    assert (qc.principal_curvatures(grid.to_mesh(), scheme).rings == 2 - (scheme.name == "jet-2")).all()
+    assert (qc.curvatures(grid.to_mesh(), scheme).rings == 2 - (scheme.name == "jet-2")).all()
 
 
 @pytest.mark.parametrize("mean_curvature", [on_grid, on_faces])
@@ -485,7 +485,7 @@ def test_boundary_nan_leaves_the_border_out_and_the_rest_alone():
 
 def test_neighbourhood_grows_before_the_degree_falls():
     grid, _ = sampled("elliptic_paraboloid", 20, 0.1)
-    fits = qc.principal_curvatures(grid.to_mesh())
+    fits = qc.curvatures(grid.to_mesh())
     assert (fits.degree == 4).all()
     assert (inner(fits.rings.reshape(grid.shape), grid.wrap, 1) == 2).all()
     assert fits.rings.reshape(grid.shape)[0].min() > 2
@@ -494,7 +494,7 @@ def test_neighbourhood_grows_before_the_degree_falls():
 def test_three_columns_cannot_hold_a_cubic():
     x, y = np.meshgrid(np.arange(3.0), np.arange(20.0), indexing="ij")
     z = (x - 1) ** 2 / 20 + (y - 10) ** 2 / 50
-    fits = qc.principal_curvatures(qc.QuadGrid(np.stack((x, y, z), axis=-1)))
+    fits = qc.curvatures(qc.QuadGrid(np.stack((x, y, z), axis=-1)))
     assert (fits.degree == 2).all()
     assert np.isfinite(fits.mean).all()
     assert fits.mean[1, 10] == pytest.approx(-(1 / 10 + 1 / 25) / 2, abs=1e-3)
@@ -502,11 +502,11 @@ def test_three_columns_cannot_hold_a_cubic():
 
 def test_too_few_vertices_and_missing_ones():
     square = [(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0.0)]
-    fits = qc.principal_curvatures((square, [(0, 1, 2, 3)]))
+    fits = qc.curvatures((square, [(0, 1, 2, 3)]))
     assert np.isnan(fits.mean).all()
     assert (fits.degree == 0).all()
     line = np.stack(np.broadcast_arrays(np.arange(8.0)[:, None], np.zeros(8), 0.0), axis=-1)
-    fits = qc.principal_curvatures(qc.QuadGrid(line))  # all rows coincide
+    fits = qc.curvatures(qc.QuadGrid(line))  # all rows coincide
     assert np.isnan(fits.mean).all()
     assert (fits.degree == 0).all()
     mesh = surfaces.cubed_sphere().sample((4, 4), "faces")[0]
@@ -531,7 +531,7 @@ def box(n):
 def test_coarse_spheres(n, bound):
     """Of 26 to 218 vertices: a quarter of the way round, the two rings of the first ones are vertical."""
     mesh = surfaces.cubed_sphere().sample((n, n), "faces")[0]
-    fits = qc.principal_curvatures(mesh)
+    fits = qc.curvatures(mesh)
     assert np.abs(fits.mean - 1).max() < bound
     expected = (2, 1) if n < 4 else (4, 2)
     assert set(zip(fits.degree.tolist(), fits.rings.tolist(), strict=True)) == {expected}
@@ -539,7 +539,7 @@ def test_coarse_spheres(n, bound):
 
 def test_corners_of_a_cube():
     """The opposite one lies over the same point of the plane; six make a hexagon, at two heights."""
-    fits = qc.principal_curvatures(box(1)[0])
+    fits = qc.curvatures(box(1)[0])
     assert np.abs(fits.mean - 1.5 * np.sqrt(3)).max() < 1e-12
     assert (fits.rings == 1).all()
     for n in (2, 3, 4, 5):
@@ -563,7 +563,7 @@ def test_thin_plates_are_not_fitted_with_their_other_side(n):
 def test_steep_windows_of_grids():
     surface = surfaces.torus()
     grid, xi, eta = surface.sample((12, 8))
-    fits = qc.principal_curvatures(grid)
+    fits = qc.curvatures(grid)
     assert (fits.degree == 2).all()
     assert (fits.rings == 1).all()
     assert np.abs(fits.mean - surface.mean_curvature(xi, eta)).max() < 0.3
@@ -573,7 +573,7 @@ def test_steep_windows_of_grids():
 def test_folded_sheet_is_flat_up_to_its_fold(layout):
     i, y = np.meshgrid(np.arange(21.0), np.arange(11.0), indexing="ij")
     grid = qc.QuadGrid(np.stack((10 - np.abs(i - 10), y, np.where(i > 10, -0.05, 0)), axis=-1))
-    fits = qc.principal_curvatures(grid if layout == "grid" else grid.to_mesh(), boundary="nan")
+    fits = qc.curvatures(grid if layout == "grid" else grid.to_mesh(), boundary="nan")
     inside = slice(1, 10), slice(1, -1)
     assert np.abs(fits.mean.reshape(grid.shape)[inside]).max() < 1e-12
     assert (fits.rings.reshape(grid.shape)[9, 2:-2] == 1).all()
@@ -585,7 +585,7 @@ def test_folded_sheet_is_flat_up_to_its_fold(layout):
 )
 def test_nothing_is_too_steep_on_fine_meshes(name, layout, jitter):
     mesh, _ = sampled(name, 48, jitter, layout)
-    fits = qc.principal_curvatures(mesh)
+    fits = qc.curvatures(mesh)
     assert (fits.degree == 4).all()
     assert (fits.rings == 2).all()
 
@@ -610,7 +610,7 @@ def test_non_orientable_mesh_takes_the_side_of_positive_mean_curvature():
     faces = np.stack((index[:-1, :-1], index[1:, :-1], index[1:, 1:], index[:-1, 1:]), axis=-1).reshape(-1, 4)
     with pytest.warns(UserWarning, match="non-orientable"):
         strip = qc.QuadMesh(points.reshape(-1, 3), faces)
-    fits = qc.principal_curvatures(strip)
+    fits = qc.curvatures(strip)
     assert (fits.mean >= 0).all()
     assert (fits.k1 >= fits.k2).all()
     assert np.abs((fits.k1 + fits.k2) / 2 - fits.mean).max() < 1e-12
@@ -656,7 +656,7 @@ def noisy(name, n, noise, seed=7):
 def test_error_bars_cover(noise):
     """Two standard errors of ten residuals cover 92 %; of K, k1 and k2 while the noise is small."""
     mesh, exact = noisy("torus", 96, noise)
-    fits = qc.principal_curvatures(mesh)
+    fits = qc.curvatures(mesh)
     for value, error, true in zip(
         (fits.mean, fits.gaussian, fits.k1, fits.k2), fits.standard_error, exact, strict=True
     ):

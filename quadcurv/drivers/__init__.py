@@ -8,13 +8,13 @@ from typing import TypeGuard
 import numpy as np
 import scipy
 
-from quadcurv.boundary import checked_boundary, stencils
+from quadcurv.boundary import checked_boundary, one_rings
 from quadcurv.drivers import compiled, direct, fits
 from quadcurv.mesh import Mesh, QuadGrid, QuadMesh, StaggeredGrid
 from quadcurv.schemes import Curvatures, Fit, Laplacian
 from quadcurv.types import Floats
 
-__all__ = ["fit", "has_holes", "on_grid", "run", "stiffness"]
+__all__ = ["fit", "has_holes", "run", "stiffness"]
 
 
 # The quads of a staggered grid cover it twice, once for its cells and once for their corners: so that the
@@ -25,7 +25,7 @@ _CELLS = 2.0
 def fit(mesh: Mesh, scheme: Fit, boundary: str = "extrapolate") -> Curvatures:
     """Curvatures by a fit at every vertex of a mesh, in the shape of its results."""
     if has_holes(mesh):
-        return fits.each(fits.fit(mesh.to_mesh(), scheme, boundary), lambda values: on_grid(mesh, values))
+        return fits.each(fits.fit(mesh.to_mesh(), scheme, boundary), mesh.in_shape)
     return fits.fit(mesh, scheme, boundary)
 
 
@@ -41,9 +41,9 @@ def run(
     results = _arrays(mesh, wanted, out or {})
     if has_holes(mesh):
         for name, values in run(mesh.to_mesh(), scheme, results, boundary).items():
-            results[name][...] = on_grid(mesh, values)
+            results[name][...] = mesh.in_shape(values)
     elif scheme.fast is None:
-        direct.evaluate(mesh.stencils(), stencils(mesh, boundary), scheme, results)
+        direct.evaluate(mesh.stencils(), one_rings(mesh, boundary), scheme, results)
     elif isinstance(mesh, QuadMesh):
         compiled.evaluate_faces(mesh, scheme, boundary, results)
     else:
@@ -71,14 +71,6 @@ def stiffness(
 def has_holes(mesh: Mesh) -> TypeGuard[QuadGrid]:
     """Whether points of a grid are masked: it is computed as a face list then."""
     return isinstance(mesh, QuadGrid) and mesh.mask is not None
-
-
-def on_grid(grid: QuadGrid, values: Floats) -> Floats:
-    """Values of the face list of a grid with holes at their places, NaN in the holes."""
-    assert grid.mask is not None
-    placed = np.full((*grid.shape, *values.shape[1:]), np.nan)
-    placed[~grid.mask] = values
-    return placed
 
 
 def _arrays(mesh: Mesh, wanted: Iterable[str], out: Mapping[str, Floats]) -> dict[str, Floats]:

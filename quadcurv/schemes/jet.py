@@ -48,7 +48,7 @@ def jet(degree: int | Literal["auto"] = 4, rings: int | None = None) -> Fit:
         all this; both are 0 where there is no result.
         With boundary="extrapolate" as many ghost layers as rings, if these are no more than two,
         are put around grids and face lists, by quintic extrapolation along strips of six points as
-        :func:`quadcurv.stencils` traces them: borders are then as good as the inside. Fits are one-sided
+        :func:`quadcurv.one_rings` traces them: borders are then as good as the inside. Fits are one-sided
         where a strip is rough or cannot be traced.
 
     Raises

@@ -12,7 +12,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from quadcurv.comparison import Comparison
-from quadcurv.curvature import principal_curvatures
+from quadcurv.curvature import curvatures
 from quadcurv.mesh import Mesh, QuadGrid, StaggeredGrid
 from quadcurv.quality import quality
 from quadcurv.schemes import Curvatures
@@ -283,9 +283,9 @@ FIELDS: dict[str, Callable[[Comparison], Field]] = {
 def jet(comparison: Comparison) -> Curvatures:
     """All curvatures by jet; what is beyond a grid too narrow to be continued is left out of the fits."""
     try:
-        return principal_curvatures(comparison.mesh)
+        return curvatures(comparison.mesh)
     except MeshError:
-        return principal_curvatures(comparison.mesh, boundary="nan")
+        return curvatures(comparison.mesh, boundary="nan")
 
 
 def drawn(mesh: Mesh) -> tuple[Floats, Ints, bool]:
