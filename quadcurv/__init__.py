@@ -12,10 +12,10 @@ from quadcurv.curvature import (
     stiffness_matrix,
     vertex_normals,
 )
-from quadcurv.io import as_mesh, attach, read, to_pymeshlab, to_pyvista, to_trimesh, write
+from quadcurv.io import as_mesh, attach, read, read_values, to_pymeshlab, to_pyvista, to_trimesh, write
 from quadcurv.kernels.ranges import set_threads
 from quadcurv.mesh import QuadGrid, QuadMesh, Recovery, StaggeredGrid
-from quadcurv.repair import as_grid, duplicate_points, merge_points, pair_triangles
+from quadcurv.repair import as_grid, duplicate_points, flip, merge_points, orient, pair_triangles
 from quadcurv.schemes import SCHEMES, Curvatures, Fit, Laplacian, Scheme
 from quadcurv.stencils import CornerTable, Stencils
 from quadcurv.types import MeshError, MeshWarning, PrecisionWarning
@@ -42,14 +42,17 @@ __all__ = [
     "dual_areas",
     "duplicate_points",
     "evaluate",
+    "flip",
     "gaussian_curvature",
     "mass_matrix",
     "mean_curvature",
     "mean_curvature_normal",
     "merge_points",
+    "orient",
     "pair_triangles",
     "principal_curvatures",
     "read",
+    "read_values",
     "set_threads",
     "stencils",
     "stiffness_matrix",
