@@ -11,6 +11,7 @@ import scipy
 from numpy.typing import NDArray
 
 from quadcurv.coincidence import first_at_place
+from quadcurv.io.base import FaceList, polygons
 from quadcurv.io.meshes import as_mesh, face_list
 from quadcurv.mesh import Mesh, QuadGrid, QuadMesh, Recovery, StaggeredGrid
 from quadcurv.stencils import face_pairs
@@ -69,9 +70,10 @@ def pair_triangles(mesh: Any) -> QuadMesh:
             chosen.append(pair)
     faces = mesh.faces.copy()
     faces[np.minimum(f, g)[chosen]] = quads[chosen]
-    paired = QuadMesh(mesh.points, np.delete(faces, np.maximum(f, g)[chosen], axis=0))
     n_triangles = int(np.count_nonzero(mesh.faces[:, 3] < 0))
-    return paired.with_recovery(Recovery("shape", 2 * len(chosen) / max(n_triangles, 1)))
+    recovery = Recovery("shape", 2 * len(chosen) / max(n_triangles, 1))
+    paired = QuadMesh(_given_points(mesh), np.delete(faces, np.maximum(f, g)[chosen], axis=0))
+    return paired.with_recovery(recovery)
 
 
 def _least_sine(quads: Floats) -> Floats:
@@ -116,7 +118,8 @@ def duplicate_points(mesh: Any, tolerance: float = 0.0) -> NDArray[np.int64]:
 def merge_points(mesh: Any, tolerance: float = 0.0) -> tuple[QuadMesh, NDArray[np.int64]]:
     """Merge vertices at the same place, as at a seam; vertices without a face stay.
 
-    A quad with a side of length zero becomes a triangle; a face with fewer than three places is left out.
+    A side of length zero is left out, so that a quad becomes a triangle; so is a face with fewer than three
+    places.
 
     Parameters
     ----------
@@ -135,20 +138,24 @@ def merge_points(mesh: Any, tolerance: float = 0.0) -> tuple[QuadMesh, NDArray[n
     Raises
     ------
     MeshError
-        A ValueError: faces that meet where more than two share an edge, or no face is left.
+        A ValueError: no face is left.
+
+    Warns
+    -----
+    MeshWarning
+        Faces now meet where more than two share an edge, or are the same one.
     """
     mesh = face_list(mesh, seams=False)
     kept, vertex = np.unique(duplicate_points(mesh, tolerance), return_inverse=True)
-    corners = mesh.faces >= 0
-    faces = np.where(corners, vertex[mesh.faces], -1)
-    following = np.where(corners, np.roll(faces, -1, axis=1), -1)
-    triangle = ~corners[:, 3]
-    following[triangle, 2] = faces[triangle, 0]
-    moved = corners & (faces != following)
-    faces[~moved] = -1
-    # Left-justify the corners that remain.
-    faces = np.take_along_axis(faces, np.argsort(~moved, axis=1, kind="stable"), axis=1)
-    return QuadMesh(mesh.points[kept], faces[moved.sum(axis=1) >= 3]), vertex
+    given = FaceList.of(mesh)
+    corners = vertex[given.corners]
+    end = np.cumsum(given.sizes)
+    following = np.arange(1, len(corners) + 1)
+    following[end - 1] = end - given.sizes
+    moved = corners != corners[following]
+    sides = np.add.reduceat(moved, end - given.sizes, dtype=np.int64)
+    moved &= np.repeat(sides >= 3, given.sizes)
+    return QuadMesh(_given_points(mesh)[kept], polygons(sides[sides >= 3], corners[moved])), vertex
 
 
 def as_grid(mesh: Any) -> tuple[QuadGrid, NDArray[np.int64]]:
@@ -235,7 +242,7 @@ def as_grid(mesh: Any) -> tuple[QuadGrid, NDArray[np.int64]]:
         vertex = np.concatenate((vertex, [origin[last]]))
     if len(np.unique(vertex)) < vertex.size:
         raise MeshError("mesh: not a grid, some vertices lie at several places of its border")
-    return QuadGrid(mesh.points[vertex], (wraps, closes)), vertex.astype(np.int64)
+    return QuadGrid(_given_points(mesh)[vertex], (wraps, closes)), vertex.astype(np.int64)
 
 
 def flip(mesh: Any) -> Mesh:
@@ -262,11 +269,9 @@ def flip(mesh: Any) -> Mesh:
 
 def _turned(mesh: QuadMesh, turn: Bools) -> QuadMesh:
     """The mesh with some of its faces given the other way round."""
-    backward = np.where(mesh.faces[:, 3:] < 0, [0, 2, 1, 3], [0, 3, 2, 1])
-    faces = np.where(turn[:, None], np.take_along_axis(mesh.faces, backward, axis=1), mesh.faces)
-    turned = QuadMesh(mesh.points, faces)
-    turned.recovery = mesh.recovery
-    return turned
+    faces = FaceList.of(mesh).turned(turn)
+    turned = QuadMesh(_given_points(mesh), polygons(faces.sizes, faces.corners))
+    return turned if mesh.recovery is None else turned.with_recovery(mesh.recovery)
 
 
 def orient(mesh: Any) -> Mesh:
@@ -311,3 +316,8 @@ def _inside_out(mesh: QuadMesh) -> Bools:
     middle = (a + b + c + np.where(sides[:, None] == 4, d, 0)) / sides[:, None]
     volume = np.einsum("fx,fx->f", middle, np.cross(c - a, d - b))
     return (closed & (np.bincount(part, volume, minlength=n_parts) < 0))[part]
+
+
+def _given_points(mesh: QuadMesh) -> NDArray[np.floating]:
+    """Positions as precise as they were given, so that what is made of them knows."""
+    return mesh.points.astype(np.float32) if mesh.roundoff > 2.0**-50 else mesh.points

@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 
 from quadcurv import (
     MeshError,
+    MeshWarning,
     QuadGrid,
     QuadMesh,
     Recovery,
@@ -25,6 +26,7 @@ from quadcurv import (
     surfaces,
 )
 from quadcurv.coincidence import first_at_place
+from quadcurv.io.base import FaceList
 from quadcurv.io.quads import quads_by_carrier, quads_by_order, split_quads
 from quadcurv.repair import flip, orient
 
@@ -260,14 +262,35 @@ def test_a_pole_of_quads_becomes_triangles():
     assert merged.stencils().ring_areas.sum(axis=0) == pytest.approx([0, 0, 0], abs=1e-12)
 
 
-def test_merging_drops_faces_without_three_places_and_rejects_what_is_no_mesh():
+def test_merging_drops_faces_without_three_places_and_tells_of_edges_of_many_faces():
     points = [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [0, 0, 0], [1, 0, 0]]
     merged, vertex = merge_points(QuadMesh(points, [[0, 1, 2, 3], [0, 4, 5, 1]]))
     assert merged.faces.tolist() == [[0, 1, 2, 3]]
     assert vertex.tolist() == [0, 1, 2, 3, 0, 1]
     book = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, -1, 0], [0, 0, 1], [0, 0, 0], [1, 0, 0]]
-    with pytest.raises(MeshError, match="more than two faces"):
+    with pytest.warns(MeshWarning, match="1 edge.s. with more than two faces"):
         merge_points(QuadMesh(book, [[0, 1, 2], [1, 0, 3], [5, 6, 4]]))
+
+
+def test_polygons_stay_polygons_where_points_are_merged_or_faces_turned():
+    angle = np.arange(5) * 2 * np.pi / 5
+    points = np.zeros((12, 3))
+    points[:5, :2] = np.stack((np.cos(angle), np.sin(angle)), axis=-1)
+    points[5:10, :2] = 2 * points[:5, :2]
+    points[10], points[11] = points[0], points[1]
+    mesh = QuadMesh(points, [[0, 5, 6, 1], [11, 6, 7, 2], [0, 1, 2, 3, 4], [10, 1, 11]])
+    merged, _ = merge_points(mesh)
+    assert [f.tolist() for f in np.split(*_csr(merged))] == [[0, 5, 6, 1], [1, 6, 7, 2], [0, 1, 2, 3, 4]]
+    assert [f.tolist() for f in np.split(*_csr(flip(merged)))] == [
+        [0, 1, 6, 5],
+        [1, 2, 7, 6],
+        [0, 4, 3, 2, 1],
+    ]
+
+
+def _csr(mesh):
+    faces = FaceList.of(mesh)
+    return faces.corners, np.cumsum(faces.sizes)[:-1]
 
 
 # -------------------------------------------------------------------------------------------- as_grid

@@ -8,12 +8,13 @@ import warnings
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from quadcurv.types import Floats, MeshError, MeshWarning
+from quadcurv.mesh import QuadMesh
+from quadcurv.types import Bools, Indices, Ints, MeshError, MeshWarning
 
 SAME_PLACE = 1e-6  # of the extent of a mesh: single precision is what many files have
 
@@ -56,14 +57,14 @@ class Format:
     read : callable or None
         Path -> Content; MeshError where the file is no such file.
     write : callable or None
-        (path, points, faces, values) into a new file; faces is (m, 4) with -1 behind triangles.
+        (path, mesh, values) into a new file.
     holds_values : bool
         Whether `write` takes values.
     """
 
     suffixes: tuple[str, ...]
     read: Callable[[Path], Content] | None = None
-    write: Callable[[Path, Floats, NDArray[Any], Values], None] | None = None
+    write: Callable[[Path, QuadMesh, Values], None] | None = None
     holds_values: bool = False
 
 
@@ -138,6 +139,60 @@ def polygons(sizes: Sequence[int] | NDArray[Any], vertices: Sequence[int] | NDAr
         table[np.arange(4) < sizes[:, None]] = vertices
         return table
     return [face.tolist() for face in np.split(vertices, ends[:-1])]
+
+
+class FaceList(NamedTuple):
+    """Faces as a mesh was given them, polygons uncut.
+
+    Attributes
+    ----------
+    sizes : (m,) int64
+    corners : (sum of sizes,) int32
+        The vertices of all faces, one after the other.
+    piece : (m,) int64
+        For each the first of the mesh's `faces` that is a piece of it.
+    """
+
+    sizes: Indices
+    corners: Ints
+    piece: Indices
+
+    @classmethod
+    def of(cls, mesh: QuadMesh) -> FaceList:
+        """Triangles, quads and polygons of a mesh, in the order of its faces."""
+        faces, cut = mesh.faces, mesh.connectivity.polygons
+        sizes = np.where(faces[:, 3] < 0, 3, 4)
+        if cut is None:
+            return cls(sizes, faces[faces >= 0], np.arange(len(faces)))
+        # Each polygon takes the place of the first of its pieces.
+        whole = cut.face < 0
+        polygon, first = np.unique(cut.face[~whole], return_index=True)
+        first = np.flatnonzero(~whole)[first]
+        sizes[~whole] = 0
+        sides = np.diff(cut.indptr)[polygon]
+        at = np.repeat((np.cumsum(sizes))[first], sides)
+        kept = np.isin(np.repeat(np.arange(len(cut.indptr) - 1), np.diff(cut.indptr)), polygon)
+        single = faces[whole]
+        order = np.argsort(at, kind="stable")
+        corners = np.insert(single[single >= 0], at[order], cut.corners[kept][order])
+        sizes[first] = sides
+        piece = np.flatnonzero(sizes)
+        return cls(sizes[piece], corners, piece)
+
+    def words(self, shift: int = 0) -> list[list[str]]:
+        """The vertices of every face in decimal, `shift` added."""
+        corners = list(map(str, (self.corners + shift).tolist()))
+        ends = np.cumsum(self.sizes).tolist()
+        return [corners[begin:end] for begin, end in zip([0, *ends], ends, strict=False)]
+
+    def turned(self, turn: Bools) -> FaceList:
+        """The same, those of the faces turned over whose pieces are, each from the same first vertex."""
+        end = np.cumsum(self.sizes)
+        begin = np.repeat(end - self.sizes, self.sizes)
+        place = np.arange(len(self.corners))
+        kept = np.repeat(~turn[self.piece], self.sizes)
+        back = np.where((place == begin) | kept, place, begin + np.repeat(end, self.sizes) - place)
+        return self._replace(corners=self.corners[back])
 
 
 def checked_values(name: str, values: NDArray[Any], shape: tuple[int, ...]) -> NDArray[Any]:

@@ -8,7 +8,8 @@ import numpy as np
 
 from quadcurv.io import trimesh as adapter
 from quadcurv.io.base import Content, Format, Values, foreign, register
-from quadcurv.types import Floats, Ints, MeshError
+from quadcurv.mesh import QuadMesh
+from quadcurv.types import MeshError
 
 
 def read_gltf(path: Path) -> Content:
@@ -18,9 +19,9 @@ def read_gltf(path: Path) -> Content:
     return adapter.content(foreign(trimesh.load_scene, path, process=False))
 
 
-def write_glb(path: Path, points: Floats, faces: Ints, values: Values) -> None:
+def write_glb(path: Path, mesh: QuadMesh, values: Values) -> None:
     """Values as _NAME in single precision, the first scalars also as colours."""
-    surface = adapter.from_faces(points, faces)
+    surface = adapter.from_mesh(mesh)
     coloured = False
     for name, array in values.items():
         if not np.isfinite(array).all():

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import os
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -111,18 +110,26 @@ def _made(content: Content, quads: Any, wrap: Wrap | None, seams: bool) -> QuadM
         _refuse(quads, None, "StructuredGrid")
         return closed_grid(content.points, wrap, seams)
     _refuse(None, wrap, "face list")
-    if quads is not None:
-        if content.pairing is None:
-            _refuse(quads, None, "mesh that has its own")
-        content = dataclasses.replace(content, faces=quads, pairing=("given", content.pairing[1]))
-    mesh = QuadMesh(content.points, content.faces)
-    if content.pairing is not None:
+    faces, recovery = content.faces, None
+    if content.pairing is None:
+        _refuse(quads, None, "mesh that has its own")
+    else:
         rule, n_triangles = content.pairing
-        n_quads = int(np.count_nonzero(mesh.faces[:, 3] >= 0))
-        mesh.recovery = Recovery(rule, 2 * n_quads / max(n_triangles, 1))
+        if quads is not None:
+            faces, rule = quads, "given"
+        recovery = Recovery(rule, 2 * _count_quads(faces) / max(n_triangles, 1))
+    mesh = QuadMesh(content.points, faces)
+    if recovery is not None:
+        mesh = mesh.with_recovery(recovery)
     if seams:
         warn_of_seam(mesh)
     return mesh
+
+
+def _count_quads(faces: Any) -> int:
+    if isinstance(faces, np.ndarray) and faces.ndim == 2:
+        return int(np.count_nonzero(faces[:, 3] >= 0)) if faces.shape[1] == 4 else 0
+    return sum(len(face) == 4 and face[3] >= 0 for face in faces)
 
 
 def read(
@@ -249,7 +256,7 @@ def write(path: str | os.PathLike[str], mesh: Any, point_data: Mapping[str, Arra
     if data and not FORMATS[suffix].holds_values:
         known = ", ".join(sorted(name for name, entry in FORMATS.items() if entry.holds_values))
         raise MeshError(f"point_data: {suffix} holds no values; {known} do")
-    writer(path, surface.points, surface.faces, data)
+    writer(path, surface, data)
 
 
 def face_list(mesh: Any, seams: bool = True) -> QuadMesh:

@@ -6,8 +6,9 @@ from pathlib import Path
 
 import numpy as np
 
-from quadcurv.io.base import Content, Format, Values, polygons, register
-from quadcurv.types import Floats, Ints, MeshError
+from quadcurv.io.base import Content, FaceList, Format, Values, polygons, register
+from quadcurv.mesh import QuadMesh
+from quadcurv.types import MeshError
 
 
 def read_obj(path: Path) -> Content:
@@ -33,10 +34,10 @@ def read_obj(path: Path) -> Content:
     return Content(np.array(points, float).reshape(-1, 3), polygons(sizes, corners))
 
 
-def write_obj(path: Path, points: Floats, faces: Ints, values: Values) -> None:
-    """OBJ with every digit of the positions."""
-    lines = ["v " + " ".join(map(repr, point)) for point in points.tolist()]
-    lines += ["f " + " ".join(str(v + 1) for v in face if v >= 0) for face in faces.tolist()]
+def write_obj(path: Path, mesh: QuadMesh, values: Values) -> None:
+    """Every digit of the positions."""
+    lines = ["v " + " ".join(map(repr, point)) for point in mesh.points.tolist()]
+    lines += ["f " + " ".join(face) for face in FaceList.of(mesh).words(1)]
     path.write_text("\n".join(lines) + "\n", encoding="ascii")
 
 

@@ -7,8 +7,9 @@ from pathlib import Path
 
 import numpy as np
 
-from quadcurv.io.base import Content, Format, Values, polygons, register
-from quadcurv.types import Floats, Ints, MeshError
+from quadcurv.io.base import Content, FaceList, Format, Values, polygons, register
+from quadcurv.mesh import QuadMesh
+from quadcurv.types import MeshError
 
 
 def read_off(path: Path) -> Content:
@@ -32,12 +33,12 @@ def read_off(path: Path) -> Content:
     return Content(points, polygons(sizes, [v for face in faces for v in face]))
 
 
-def write_off(path: Path, points: Floats, faces: Ints, values: Values) -> None:
-    """OFF with every digit of the positions."""
-    lines = ["OFF", f"{len(points)} {len(faces)} 0"]
-    lines += [" ".join(map(repr, point)) for point in points.tolist()]
-    polygon = [[v for v in face if v >= 0] for face in faces.tolist()]
-    lines += [" ".join(map(str, (len(face), *face))) for face in polygon]
+def write_off(path: Path, mesh: QuadMesh, values: Values) -> None:
+    """Every digit of the positions."""
+    faces = FaceList.of(mesh)
+    lines = ["OFF", f"{len(mesh.points)} {len(faces.sizes)} 0"]
+    lines += [" ".join(map(repr, point)) for point in mesh.points.tolist()]
+    lines += [f"{len(face)} " + " ".join(face) for face in faces.words()]
     path.write_text("\n".join(lines) + "\n", encoding="ascii")
 
 

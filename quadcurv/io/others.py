@@ -27,8 +27,7 @@ def to_trimesh(mesh: Any) -> Any:
         Not processed: no vertex merged or dropped. Quads (a, b, c, d) as (a, b, c) and (c, d, a), as trimesh
         cuts them; the face attribute "quadcurv" tells :func:`as_mesh` which belong together.
     """
-    surface = face_list(mesh)
-    return trimesh.from_faces(surface.points, surface.faces)
+    return trimesh.from_mesh(face_list(mesh))
 
 
 def to_pyvista(mesh: Any) -> Any:
@@ -47,8 +46,7 @@ def to_pyvista(mesh: Any) -> Any:
     mesh = as_mesh(mesh)
     if isinstance(mesh, QuadGrid):
         return pyvista.from_grid(mesh.points, mesh.wrap)
-    surface = face_list(mesh)
-    return pyvista.from_faces(surface.points, surface.faces)
+    return pyvista.from_mesh(face_list(mesh))
 
 
 def to_pymeshlab(mesh: Any) -> Any:
@@ -69,8 +67,7 @@ def to_pymeshlab(mesh: Any) -> Any:
     ImportError
         pymeshlab, the extra "meshlab", or a system library that it needs is not installed.
     """
-    surface = face_list(mesh)
-    return pymeshlab.from_faces(surface.points, surface.faces)
+    return pymeshlab.from_mesh(face_list(mesh))
 
 
 def attach(mesh: Any, name: str, values: ArrayLike, colormap: str | None = "viridis") -> None:

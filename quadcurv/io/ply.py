@@ -6,15 +6,15 @@ binary files with faces of several sizes, VTK reads single precision, plyfile is
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from quadcurv.io.base import Content, Format, polygons, register
-from quadcurv.types import Floats, Ints, MeshError
+from quadcurv.io.base import Content, FaceList, Format, Values, polygons, register
+from quadcurv.mesh import QuadMesh
+from quadcurv.types import MeshError
 
 PlyElements = dict[str, tuple[int, list[tuple[str, ...]]]]
 PLY_TYPES = {
@@ -120,7 +120,7 @@ def _ply_element(
     return columns, offset
 
 
-def write_ply(path: Path, points: Floats, faces: Ints, point_data: Mapping[str, NDArray[Any]]) -> None:
+def write_ply(path: Path, mesh: QuadMesh, point_data: Values) -> None:
     """Binary PLY; values (n,) as a property of that name, (n, 3) as name_x, name_y, name_z.
 
     Values named "normal" or "normals" become nx, ny, nz, which other readers take for normals. Booleans
@@ -131,6 +131,7 @@ def write_ply(path: Path, points: Floats, faces: Ints, point_data: Mapping[str, 
     MeshError
         A ValueError: names that repeat, or are no words of ASCII.
     """
+    points, faces = mesh.points, FaceList.of(mesh)
     columns = dict(zip("xyz", points.T, strict=True))
     for name, values in point_data.items():
         if values.ndim == 1:
@@ -152,13 +153,17 @@ def write_ply(path: Path, points: Floats, faces: Ints, point_data: Mapping[str, 
     spelled = {"u1": "uchar", "i4": "int", "f8": "double"}
     header = ["ply", "format binary_little_endian 1.0", f"element vertex {len(points)}"]
     header += [f"property {spelled[vertices.dtype[k].str[1:]]} {k}" for k in columns]
-    header += [f"element face {len(faces)}", "property list uchar int vertex_indices", "end_header", ""]
-    corner = faces >= 0
-    rows = np.empty((len(faces), 17), np.uint8)
-    rows[:, 0] = corner.sum(axis=1)
-    rows[:, 1:] = faces.astype("<i4").view(np.uint8)
-    kept = np.repeat(np.c_[corner[:, :1], corner], [1, 4, 4, 4, 4], axis=1)
-    path.write_bytes("\n".join(header).encode("ascii") + vertices.tobytes() + rows[kept].tobytes())
+    small = faces.sizes.max() < 256
+    header += [f"element face {len(faces.sizes)}"]
+    header += [f"property list {'uchar' if small else 'int'} int vertex_indices", "end_header", ""]
+    begin = np.cumsum(faces.sizes) - faces.sizes
+    corners = faces.corners.astype("<i4")
+    rows = (
+        np.insert(corners.view(np.uint8), 4 * begin, faces.sizes)
+        if small
+        else np.insert(corners, begin, faces.sizes)
+    )
+    path.write_bytes("\n".join(header).encode("ascii") + vertices.tobytes() + rows.tobytes())
 
 
 def _ply_type(values: NDArray[Any]) -> str:

@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 
 from quadcurv.io import ply
 from quadcurv.io.base import Content, Library, checked_values, is_a, polygons, register
-from quadcurv.types import Floats, Ints, MeshError
+from quadcurv.mesh import QuadMesh
+from quadcurv.types import MeshError
 
 
 def content(mesh: Any) -> Content:
@@ -34,7 +35,7 @@ def _current_mesh(mesh: Any) -> Any:
     return mesh
 
 
-def from_faces(points: Floats, faces: Ints) -> Any:
+def from_mesh(mesh: QuadMesh) -> Any:
     """A MeshSet of one mesh, quads and doubles kept."""
     try:
         import pymeshlab
@@ -46,7 +47,7 @@ def from_faces(points: Floats, faces: Ints) -> Any:
     # A file, since the constructor that takes polygons rounds positions to single precision.
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "quadcurv.ply"
-        ply.write_ply(path, points, faces, {})
+        ply.write_ply(path, mesh, {})
         meshes.load_new_mesh(str(path))
     return meshes
 

@@ -7,8 +7,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from quadcurv.io.base import Content, Library, checked_values, is_a, polygons, register
-from quadcurv.types import Floats, Ints, MeshError
+from quadcurv.io.base import Content, FaceList, Library, checked_values, is_a, polygons, register
+from quadcurv.mesh import QuadMesh
+from quadcurv.types import Floats, MeshError
 
 TRIANGLE, POLYGON, PIXEL, QUAD = 5, 7, 8, 9
 
@@ -79,12 +80,14 @@ def _polygon_cells(dataset: Any) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     return sizes, corners
 
 
-def from_faces(points: Floats, faces: Ints) -> Any:
+def from_mesh(mesh: QuadMesh) -> Any:
     """A PolyData of the same faces."""
     import pyvista
 
-    rows = np.column_stack(((faces >= 0).sum(axis=1), faces))
-    return pyvista.PolyData(points.copy(), faces=rows[rows >= 0])
+    faces = FaceList.of(mesh)
+    begin = np.cumsum(faces.sizes) - faces.sizes
+    rows = np.insert(faces.corners.astype(np.int64), begin, faces.sizes)
+    return pyvista.PolyData(mesh.points.copy(), faces=rows)
 
 
 def from_grid(points: Floats, wrap: tuple[bool, bool]) -> Any:

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from quadcurv.checks import checked_wrap
 from quadcurv.coincidence import first_at_place
 from quadcurv.io.base import SAME_PLACE, warn
 from quadcurv.mesh import QuadGrid, QuadMesh
@@ -36,11 +37,14 @@ def warn_of_seam(mesh: QuadMesh) -> None:
 
 def closed_grid(points: NDArray[np.floating], wrap: Sequence[bool] | None, seams: bool) -> QuadGrid:
     """The grid of a StructuredGrid, whose last row or column repeats the first where it wraps."""
-    grid = QuadGrid(points, wrap or (False, False))
+    wraps = (False, False) if wrap is None else checked_wrap(wrap)
+    known = points[np.isfinite(points).all(axis=2)]
+    extent = np.ptp(known, axis=0).max() if len(known) else 0.0
     for axis, name in enumerate(("rows", "columns")):
-        gap = np.abs(grid.points.take(0, axis) - grid.points.take(-1, axis)).max()
-        meets = gap <= SAME_PLACE * np.ptp(grid.points.reshape(-1, 3), axis=0).max()
-        if grid.wrap[axis]:
+        one, other = points.take(0, axis), points.take(-1, axis)
+        gap = np.where(np.isnan(one) & np.isnan(other), 0, np.abs(one - other)).max()
+        meets = gap <= SAME_PLACE * extent
+        if wraps[axis]:
             if not meets:
                 raise MeshError(f"mesh: first and last {name} differ by {gap:.3g} although they wrap")
             points = points.take(range(points.shape[axis] - 1), axis)
@@ -49,4 +53,4 @@ def closed_grid(points: NDArray[np.floating], wrap: Sequence[bool] | None, seams
                 f"first and last {name} of the StructuredGrid coincide: it is open along a seam that "
                 "wrap=... closes"
             )
-    return QuadGrid(points, grid.wrap)
+    return QuadGrid(points, wraps)

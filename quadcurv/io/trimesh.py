@@ -9,7 +9,8 @@ from numpy.typing import NDArray
 
 from quadcurv.io.base import Content, Library, checked_values, is_a, register
 from quadcurv.io.quads import quads_by_carrier, quads_by_order, split_quads
-from quadcurv.types import Floats, Ints, MeshError
+from quadcurv.mesh import QuadMesh
+from quadcurv.types import MeshError
 
 CARRIER = "quadcurv"  # face attribute of a Trimesh that says which quad a triangle was cut from
 
@@ -70,12 +71,12 @@ def _ply_polygons(mesh: Any) -> Any:
     return polygons if unchanged and len(polygons) < len(mesh.faces) else None
 
 
-def from_faces(points: Floats, faces: Ints) -> Any:
+def from_mesh(mesh: QuadMesh) -> Any:
     """A Trimesh of quads cut in two, which carries which quad each triangle was cut from."""
     import trimesh
 
-    triangles, carrier = split_quads(faces)
-    return trimesh.Trimesh(points.copy(), triangles, process=False, face_attributes={CARRIER: carrier})
+    triangles, carrier = split_quads(mesh.faces)
+    return trimesh.Trimesh(mesh.points.copy(), triangles, process=False, face_attributes={CARRIER: carrier})
 
 
 def attach(mesh: Any, name: str, values: NDArray[Any], colormap: str | None) -> None:

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from quadcurv.io import pyvista as adapter
 from quadcurv.io.base import Content, Format, Values, foreign, register
-from quadcurv.types import Floats, Ints
+from quadcurv.mesh import QuadMesh
 
 
 def read_vtk(path: Path) -> Content:
@@ -16,9 +16,9 @@ def read_vtk(path: Path) -> Content:
     return adapter.content(foreign(pyvista.read, path))
 
 
-def write_vtk(path: Path, points: Floats, faces: Ints, values: Values) -> None:
+def write_vtk(path: Path, mesh: QuadMesh, values: Values) -> None:
     """A PolyData with its point data."""
-    surface = adapter.from_faces(points, faces)
+    surface = adapter.from_mesh(mesh)
     surface.point_data.update(values)
     surface.save(path)
 
