@@ -261,7 +261,8 @@ def flip(mesh: Any) -> Mesh:
     """
     mesh = as_mesh(mesh)
     if isinstance(mesh, QuadGrid):
-        return QuadGrid(mesh.points.swapaxes(0, 1), mesh.wrap[::-1])
+        mask = None if mesh.mask is None else mesh.mask.T
+        return QuadGrid(_given_points(mesh).swapaxes(0, 1), mesh.wrap[::-1], mask)
     if isinstance(mesh, StaggeredGrid):
         return StaggeredGrid(mesh.primal.swapaxes(0, 1), mesh.dual.swapaxes(0, 1), mesh.wrap[::-1])
     return _turned(mesh, np.ones(len(mesh.faces), bool))
@@ -318,6 +319,6 @@ def _inside_out(mesh: QuadMesh) -> Bools:
     return (closed & (np.bincount(part, volume, minlength=n_parts) < 0))[part]
 
 
-def _given_points(mesh: QuadMesh) -> NDArray[np.floating]:
+def _given_points(mesh: QuadMesh | QuadGrid) -> NDArray[np.floating]:
     """Positions as precise as they were given, so that what is made of them knows."""
     return mesh.points.astype(np.float32) if mesh.roundoff > 2.0**-50 else mesh.points
