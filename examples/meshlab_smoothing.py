@@ -10,7 +10,7 @@ def main() -> float:
     """Return by which factor smoothing a noisy sphere lowers the error of its mean curvature."""
     sphere, *_ = surfaces.cubed_sphere().sample((16, 16), "faces")
     noise = np.random.default_rng(0).normal(0, 0.002, sphere.points.shape)
-    meshes = sphere.with_points(sphere.points + noise).to_pymeshlab()
+    meshes = quadcurv.to_pymeshlab(sphere.with_points(sphere.points + noise))
     rough = quadcurv.mean_curvature(meshes)
 
     meshes.apply_coord_taubin_smoothing(stepsmoothnum=20)

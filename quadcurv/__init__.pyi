@@ -15,11 +15,11 @@ from .curvature import (
     stiffness_matrix,
     vertex_normals,
 )
-from .io import as_mesh, attach, read, to_pymeshlab, to_pyvista, to_trimesh, write
+from .io import as_mesh, attach, read, read_values, to_pymeshlab, to_pyvista, to_trimesh, write
 from .kernels.ranges import set_threads
 from .mesh import QuadGrid, QuadMesh, StaggeredGrid
 from .quality import quality, summary
-from .repair import as_grid, duplicate_points, merge_points, pair_triangles
+from .repair import as_grid, duplicate_points, flip, merge_points, orient, pair_triangles
 from .schemes import SCHEMES, Curvatures, Fit, Laplacian
 from .types import MeshError, MeshWarning, PrecisionWarning
 

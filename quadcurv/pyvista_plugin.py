@@ -10,7 +10,8 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 from quadcurv import curvature
-from quadcurv.io import libraries
+from quadcurv.io import as_mesh
+from quadcurv.io.pyvista import in_vtk_order
 from quadcurv.mesh import Mesh
 from quadcurv.schemes import Fit, Scheme
 from quadcurv.types import Floats
@@ -20,8 +21,7 @@ if TYPE_CHECKING:
 
     from quadcurv.comparison import Comparison
 
-Wrap = Sequence[bool]
-OPEN = (False, False)
+Wrap = Sequence[bool] | None
 
 
 class Accessor:
@@ -46,7 +46,7 @@ class Accessor:
         self,
         scheme: str | Scheme = "finite_volume",
         boundary: str = "extrapolate",
-        wrap: Wrap = OPEN,
+        wrap: Wrap = None,
     ) -> Floats:
         """(n,) mean curvature in 1 / length; see :func:`quadcurv.mean_curvature`."""
         return self._by_point(curvature.mean_curvature(self._mesh(wrap), scheme, boundary))
@@ -55,23 +55,23 @@ class Accessor:
         self,
         scheme: str | Scheme = "finite_volume",
         boundary: str = "extrapolate",
-        wrap: Wrap = OPEN,
+        wrap: Wrap = None,
     ) -> Floats:
         """(n, 3) mean curvature normal in 1 / length; see :func:`quadcurv.mean_curvature_normal`."""
         return self._by_point(curvature.mean_curvature_normal(self._mesh(wrap), scheme, boundary))
 
     def gaussian_curvature(
-        self, scheme: str | Fit = "jet", boundary: str = "extrapolate", wrap: Wrap = OPEN
+        self, scheme: str | Fit = "jet", boundary: str = "extrapolate", wrap: Wrap = None
     ) -> Floats:
         """(n,) Gaussian curvature in 1 / length^2; see :func:`quadcurv.gaussian_curvature`."""
         return self._by_point(curvature.gaussian_curvature(self._mesh(wrap), scheme, boundary))
 
-    def vertex_normals(self, boundary: str = "extrapolate", wrap: Wrap = OPEN) -> Floats:
+    def vertex_normals(self, boundary: str = "extrapolate", wrap: Wrap = None) -> Floats:
         """(n, 3) unit normals; see :func:`quadcurv.vertex_normals`."""
         return self._by_point(curvature.vertex_normals(self._mesh(wrap), boundary))
 
     def compare(
-        self, schemes: Any = None, exact: Any = None, wrap: Wrap = OPEN, **options: Any
+        self, schemes: Any = None, exact: Any = None, wrap: Wrap = None, **options: Any
     ) -> Comparison:
         """Mean curvature by several schemes; see :func:`quadcurv.comparison.compare`."""
         from quadcurv.comparison import compare
@@ -79,14 +79,10 @@ class Accessor:
         return compare(self._mesh(wrap), schemes, exact, **options)
 
     def _mesh(self, wrap: Wrap) -> Mesh:
-        if self._is_grid:
-            return libraries.from_structured(self._dataset, wrap)
-        if tuple(wrap) != OPEN:
-            raise TypeError("wrap: only a StructuredGrid has directions to wrap")
-        return libraries.from_pyvista(self._dataset)
+        return as_mesh(self._dataset, wrap=wrap)
 
     def _by_point(self, values: Floats) -> Floats:
-        return libraries.in_vtk_order(values, self._dataset) if self._is_grid else values
+        return in_vtk_order(values, self._dataset) if self._is_grid else values
 
 
 def _register() -> None:

@@ -1,4 +1,6 @@
-"""One mesh made into another: triangles into quads, a face list into a grid, coincident points into one."""
+"""One mesh made into another: triangles into quads, a face list into a grid, coincident points into one,
+sides turned. Each takes whatever :func:`quadcurv.as_mesh` takes.
+"""
 
 from __future__ import annotations
 
@@ -8,89 +10,15 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-from quadcurv.mesh import QuadGrid, QuadMesh, Recovery
+from quadcurv.coincidence import first_at_place
+from quadcurv.io.base import FaceList, polygons
+from quadcurv.io.meshes import as_mesh, face_list
+from quadcurv.mesh import Mesh, QuadGrid, QuadMesh, Recovery, StaggeredGrid
 from quadcurv.stencils import face_pairs
-from quadcurv.types import Floats, Ints, MeshError
+from quadcurv.types import Bools, Floats, MeshError
 
 
-def quads_by_order(triangles: NDArray[np.integer]) -> tuple[NDArray[np.integer], str]:
-    """Quads (a, b, c, d) that were split into the triangles (a, b, c) and (c, d, a).
-
-    The closing edge of each of the two is then the diagonal. Where triangle i has its other half at
-    i + n for all n quads in a row, the rule is "block" (triangles may come before and after); where it is
-    the next one, "interleaved". Each must pair at least half of the triangles. Where nine in ten have
-    their other half somewhere, the rule is "diagonal"; else "none". In a triangle mesh about one closing
-    edge in three meets another by chance.
-
-    Parameters
-    ----------
-    triangles : (k, 3) int
-
-    Returns
-    -------
-    faces : (m, 4) int
-        In the order of their first triangles; the last entry of a triangle is -1.
-    rule : str
-    """
-    k = len(triangles)
-    first, last = triangles[:, 0].astype(np.int64), triangles[:, 2].astype(np.int64)
-    closing, opposite = last << 32 | first, first << 32 | last
-    order = np.argsort(closing)
-    found = order[np.minimum(np.searchsorted(closing[order], opposite), k - 1)] if k else order
-    # Mutual, so that three triangles at one edge make no two pairs; not one triangle and its back.
-    mutual = (closing[found] == opposite) & (found[found] == np.arange(k))
-    half = np.flatnonzero(mutual & (triangles[found, 1] != triangles[:, 1]))
-    one = half[half < found[half]]
-    shift = found[one] - one
-    lengths, count = np.unique(shift, return_counts=True)
-    blocks = [one[shift == n] for n in lengths[(lengths == count) & (lengths > 1)]]
-    candidates = [("block", block) for block in blocks if block[-1] - block[0] == len(block) - 1]
-    candidates.append(("interleaved", one[shift == 1]))
-    candidates = [(rule, pairs) for rule, pairs in candidates if 4 * len(pairs) >= k]
-    if 2 * len(one) >= 0.9 * k:
-        candidates.append(("diagonal", one))
-    rule, pairs = candidates[0] if candidates else ("none", one[:0])
-    return _joined(triangles, pairs, found[pairs]), rule
-
-
-def quads_by_carrier(triangles: NDArray[np.integer], carrier: NDArray[np.integer]) -> NDArray[np.integer]:
-    """Quads of the triangles of :func:`split_quads`, whatever their order now and however many are left."""
-    closing = np.sort(triangles[:, [0, 2]], axis=1)
-    order = np.lexsort((carrier, *closing.T, carrier >> 1))
-    one, other = order[:-1], order[1:]
-    halves = (carrier[one] % 2 == 0) & (carrier[other] == carrier[one] + 1)
-    halves &= (triangles[one, 2] == triangles[other, 0]) & (triangles[one, 0] == triangles[other, 2])
-    one, other = one[halves], other[halves]
-    faces = _joined(triangles, one, other)
-    return faces[np.argsort(np.delete(carrier, other), kind="stable")]
-
-
-def split_quads(faces: Ints) -> tuple[Ints, Ints]:
-    """Triangles (a, b, c) and (c, d, a) of quads, as trimesh cuts and orders them: all first, all second.
-
-    Returns
-    -------
-    triangles : (k, 3) int32
-        Triangles of the mesh, then first halves, then second halves.
-    carrier : (k,) int32
-        Twice the index of the face, plus 1 for a second half.
-    """
-    quad = faces[:, 3] >= 0
-    number = 2 * np.arange(len(faces), dtype=np.int32)
-    triangles = np.concatenate((faces[~quad][:, :3], faces[quad][:, :3], faces[quad][:, [2, 3, 0]]))
-    return triangles, np.concatenate((number[~quad], number[quad], number[quad] + 1))
-
-
-def _joined(
-    triangles: NDArray[np.integer], one: NDArray[np.integer], other: NDArray[np.integer]
-) -> NDArray[np.integer]:
-    """Faces in the order of `triangles`, each of `other` joined to its half in `one`."""
-    faces = np.insert(triangles, 3, -1, axis=1)
-    faces[one, 3] = triangles[other, 1]
-    return np.delete(faces, other, axis=0)
-
-
-def pair_triangles(mesh: QuadMesh) -> QuadMesh:
+def pair_triangles(mesh: Any) -> QuadMesh:
     """Pair the triangles of a mesh into quads by their shape.
 
     Neighbouring triangles are matched so that as many as possible make quads as flat, convex and right-
@@ -100,8 +28,8 @@ def pair_triangles(mesh: QuadMesh) -> QuadMesh:
 
     Parameters
     ----------
-    mesh : QuadMesh
-        Its quads stay as they are.
+    mesh : object
+        Anything :func:`quadcurv.as_mesh` takes but a StaggeredGrid. Its quads stay as they are.
 
     Returns
     -------
@@ -114,6 +42,7 @@ def pair_triangles(mesh: QuadMesh) -> QuadMesh:
     every triangle on both sides; where it leaves an odd cycle the best pairs are taken first. About a
     second per 50,000 triangles.
     """
+    mesh = face_list(mesh)
     m = len(mesh.faces)
     f, i, g, j = face_pairs(mesh.faces)
     # Triangle f = (a, b, c) has the common edge from c to a; d is the corner of g across it.
@@ -141,9 +70,10 @@ def pair_triangles(mesh: QuadMesh) -> QuadMesh:
             chosen.append(pair)
     faces = mesh.faces.copy()
     faces[np.minimum(f, g)[chosen]] = quads[chosen]
-    paired = QuadMesh(mesh.points, np.delete(faces, np.maximum(f, g)[chosen], axis=0))
     n_triangles = int(np.count_nonzero(mesh.faces[:, 3] < 0))
-    return paired.with_recovery(Recovery("shape", 2 * len(chosen) / max(n_triangles, 1)))
+    recovery = Recovery("shape", 2 * len(chosen) / max(n_triangles, 1))
+    paired = QuadMesh(_given_points(mesh), np.delete(faces, np.maximum(f, g)[chosen], axis=0))
+    return paired.with_recovery(recovery)
 
 
 def _least_sine(quads: Floats) -> Floats:
@@ -159,12 +89,13 @@ def _least_sine(quads: Floats) -> Floats:
         return np.nan_to_num((sine / lengths).min(axis=1), nan=-1.0)
 
 
-def duplicate_points(mesh: QuadMesh, tolerance: float = 0.0) -> NDArray[np.int64]:
+def duplicate_points(mesh: Any, tolerance: float = 0.0) -> NDArray[np.int64]:
     """For every vertex the first one at the same place.
 
     Parameters
     ----------
-    mesh : QuadMesh
+    mesh : object
+        Anything :func:`quadcurv.as_mesh` takes but a StaggeredGrid; vertices of a grid row by row.
     tolerance : float, default 0
         Points this far apart, and chains of them, count as one place; a length.
 
@@ -181,28 +112,19 @@ def duplicate_points(mesh: QuadMesh, tolerance: float = 0.0) -> NDArray[np.int64
     """
     if not tolerance >= 0:
         raise MeshError(f"tolerance: expected a length >= 0, got {tolerance!r}")
-    n = len(mesh.points)
-    if tolerance == 0:
-        order = np.lexsort(mesh.points.T)
-        moved = (np.diff(mesh.points[order], axis=0) != 0).any(axis=1)
-        place = np.empty(n, np.int64)
-        place[order] = np.concatenate(([0], np.cumsum(moved)))
-    else:
-        pairs = scipy.spatial.cKDTree(mesh.points).query_pairs(tolerance, output_type="ndarray")
-        near = scipy.sparse.coo_array((np.ones(len(pairs), bool), (pairs[:, 0], pairs[:, 1])), shape=(n, n))
-        _, place = scipy.sparse.csgraph.connected_components(near, directed=False)
-    _, first, of = np.unique(place, return_index=True, return_inverse=True)
-    return first[of]
+    return first_at_place(face_list(mesh, seams=False).points, tolerance)
 
 
-def merge_points(mesh: QuadMesh, tolerance: float = 0.0) -> tuple[QuadMesh, NDArray[np.int64]]:
+def merge_points(mesh: Any, tolerance: float = 0.0) -> tuple[QuadMesh, NDArray[np.int64]]:
     """Merge vertices at the same place, as at a seam; vertices without a face stay.
 
-    A quad with a side of length zero becomes a triangle; a face with fewer than three places is left out.
+    A side of length zero is left out, so that a quad becomes a triangle; so is a face with fewer than three
+    places.
 
     Parameters
     ----------
-    mesh : QuadMesh
+    mesh : object
+        Anything :func:`quadcurv.as_mesh` takes but a StaggeredGrid; vertices of a grid row by row.
     tolerance : float, default 0
         As in :func:`duplicate_points`; of merged vertices the first one's position is kept.
 
@@ -216,29 +138,35 @@ def merge_points(mesh: QuadMesh, tolerance: float = 0.0) -> tuple[QuadMesh, NDAr
     Raises
     ------
     MeshError
-        A ValueError: faces that meet where more than two share an edge, or no face is left.
+        A ValueError: no face is left.
+
+    Warns
+    -----
+    MeshWarning
+        Faces now meet where more than two share an edge, or are the same one.
     """
+    mesh = face_list(mesh, seams=False)
     kept, vertex = np.unique(duplicate_points(mesh, tolerance), return_inverse=True)
-    corners = mesh.faces >= 0
-    faces = np.where(corners, vertex[mesh.faces], -1)
-    following = np.where(corners, np.roll(faces, -1, axis=1), -1)
-    triangle = ~corners[:, 3]
-    following[triangle, 2] = faces[triangle, 0]
-    moved = corners & (faces != following)
-    faces[~moved] = -1
-    # Left-justify the corners that remain.
-    faces = np.take_along_axis(faces, np.argsort(~moved, axis=1, kind="stable"), axis=1)
-    return QuadMesh(mesh.points[kept], faces[moved.sum(axis=1) >= 3]), vertex
+    given = FaceList.of(mesh)
+    corners = vertex[given.corners]
+    end = np.cumsum(given.sizes)
+    following = np.arange(1, len(corners) + 1)
+    following[end - 1] = end - given.sizes
+    moved = corners != corners[following]
+    sides = np.add.reduceat(moved, end - given.sizes, dtype=np.int64)
+    moved &= np.repeat(sides >= 3, given.sizes)
+    return QuadMesh(_given_points(mesh)[kept], polygons(sides[sides >= 3], corners[moved])), vertex
 
 
-def as_grid(mesh: QuadMesh) -> tuple[QuadGrid, NDArray[np.int64]]:
+def as_grid(mesh: Any) -> tuple[QuadGrid, NDArray[np.int64]]:
     """Make a grid of a logically Cartesian face list: a rectangle, a tube or a torus of quads.
 
     Parameters
     ----------
-    mesh : QuadMesh
-        Quads only; four at every inner vertex, two at the boundary, one at a corner. The first direction
-        of the grid runs along the first edge of the first face.
+    mesh : object
+        Anything :func:`quadcurv.as_mesh` takes but a StaggeredGrid. Quads only; four at every inner
+        vertex, two at the boundary, one at a corner. The first direction of the grid runs along the
+        first edge of the first face.
 
     Returns
     -------
@@ -254,6 +182,7 @@ def as_grid(mesh: QuadMesh) -> tuple[QuadGrid, NDArray[np.int64]]:
         A ValueError: triangles, another valence (with the first vertex), several components,
         a non-orientable mesh, a torus whose lines close with a shift, or fewer than three vertices around.
     """
+    mesh = face_list(mesh)
     faces = mesh.faces
     if (faces[:, 3] < 0).any():
         raise MeshError(f"mesh: not a grid, {np.count_nonzero(faces[:, 3] < 0)} of its faces are triangles")
@@ -313,4 +242,83 @@ def as_grid(mesh: QuadMesh) -> tuple[QuadGrid, NDArray[np.int64]]:
         vertex = np.concatenate((vertex, [origin[last]]))
     if len(np.unique(vertex)) < vertex.size:
         raise MeshError("mesh: not a grid, some vertices lie at several places of its border")
-    return QuadGrid(mesh.points[vertex], (wraps, closes)), vertex.astype(np.int64)
+    return QuadGrid(_given_points(mesh)[vertex], (wraps, closes)), vertex.astype(np.int64)
+
+
+def flip(mesh: Any) -> Mesh:
+    """Turn all faces round, so that normals point to the other side and H changes its sign.
+
+    Parameters
+    ----------
+    mesh : object
+        Anything :func:`quadcurv.as_mesh` takes.
+
+    Returns
+    -------
+    QuadMesh, QuadGrid or StaggeredGrid
+        Of a face list the same vertices, every face beginning with the same one. Of a grid its transpose:
+        rows become columns, and values (r, c) become ``values.T``.
+    """
+    mesh = as_mesh(mesh)
+    if isinstance(mesh, QuadGrid):
+        mask = None if mesh.mask is None else mesh.mask.T
+        return QuadGrid(_given_points(mesh).swapaxes(0, 1), mesh.wrap[::-1], mask)
+    if isinstance(mesh, StaggeredGrid):
+        return StaggeredGrid(mesh.primal.swapaxes(0, 1), mesh.dual.swapaxes(0, 1), mesh.wrap[::-1])
+    return _turned(mesh, np.ones(len(mesh.faces), bool))
+
+
+def _turned(mesh: QuadMesh, turn: Bools) -> QuadMesh:
+    """The mesh with some of its faces given the other way round."""
+    faces = FaceList.of(mesh).turned(turn)
+    turned = QuadMesh(_given_points(mesh), polygons(faces.sizes, faces.corners))
+    return turned if mesh.recovery is None else turned.with_recovery(mesh.recovery)
+
+
+def orient(mesh: Any) -> Mesh:
+    """Turn closed parts of a mesh so that their normals point outward, and H > 0 on a sphere.
+
+    Parameters
+    ----------
+    mesh : object
+        Anything :func:`quadcurv.as_mesh` takes.
+
+    Returns
+    -------
+    QuadMesh, QuadGrid or StaggeredGrid
+        Every part that is joined by edges and closed has a positive signed volume; a part inside another,
+        as the wall of a cavity, too. Open parts have no outside and are left as they are, as are parts
+        without volume and non-orientable meshes. Where nothing is turned the mesh itself is returned, a
+        grid that is turned is transposed as in :func:`flip`.
+    """
+    mesh = as_mesh(mesh)
+    if isinstance(mesh, QuadMesh):
+        turn = _inside_out(mesh)
+        return _turned(mesh, turn) if turn.any() else mesh
+    surface = QuadGrid(mesh.primal, mesh.wrap) if isinstance(mesh, StaggeredGrid) else mesh
+    return flip(mesh) if all(mesh.wrap) and _inside_out(surface.to_mesh()).any() else mesh
+
+
+def _inside_out(mesh: QuadMesh) -> Bools:
+    """Faces of the closed parts whose signed volume is negative."""
+    if not mesh.orientable:
+        return np.zeros(len(mesh.faces), bool)
+    m = len(mesh.faces)
+    f, _, g, _ = face_pairs(mesh.faces)
+    joined = scipy.sparse.coo_array((np.ones(f.size, bool), (f, g)), shape=(m, m))
+    n_parts, part = scipy.sparse.csgraph.connected_components(joined, directed=False)
+    sides = np.where(mesh.faces[:, 3] < 0, 3, 4)
+    closed = np.bincount(part, sides - np.bincount(f, minlength=m) - np.bincount(g, minlength=m)) == 0
+    a, b, c, d = np.moveaxis(mesh.points[np.where(mesh.faces < 0, mesh.faces[:, :1], mesh.faces)], 1, 0)
+    # About a point of the part itself: about a distant origin the volume would drown in rounding.
+    _, first = np.unique(part, return_index=True)
+    a, b, c, d = (corner - a[first[part]] for corner in (a, b, c, d))
+    # The mean of the corners times the vector area, which for quads is half the product of the diagonals.
+    middle = (a + b + c + np.where(sides[:, None] == 4, d, 0)) / sides[:, None]
+    volume = np.einsum("fx,fx->f", middle, np.cross(c - a, d - b))
+    return (closed & (np.bincount(part, volume, minlength=n_parts) < 0))[part]
+
+
+def _given_points(mesh: QuadMesh | QuadGrid) -> NDArray[np.floating]:
+    """Positions as precise as they were given, so that what is made of them knows."""
+    return mesh.points.astype(np.float32) if mesh.roundoff > 2.0**-50 else mesh.points

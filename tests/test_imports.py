@@ -18,7 +18,7 @@ HEAVY = {"trimesh", "pymeshlab", "pyvista", "igl", "matplotlib", "vtk", "vtkmodu
 FLOORS = [
     ["types"],
     ["kernels"],
-    ["stencils", "polygons"],
+    ["coincidence", "polygons", "stencils"],
     ["checks"],
     ["connectivity"],
     ["mesh"],

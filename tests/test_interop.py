@@ -247,8 +247,6 @@ def test_an_empty_or_damaged_trimesh():
         broken = trimesh.Trimesh(POINTS, [[0, 1, 4], [4, bad, 0]], process=False)
         with pytest.raises(MeshError, match=r"outside 0\.\.7, first face"):
             as_mesh(broken)
-    with pytest.raises(TypeError, match=r"expected a trimesh.Trimesh"):
-        qc.as_mesh(pv.Plane())
 
 
 # ----------------------------------------------------------------------------------------- pyvista
@@ -332,7 +330,7 @@ def test_grids_both_ways(wrap, rng):
     grid = QuadGrid(rng.standard_normal((5, 6, 3)), wrap)
     data = qc.to_pyvista(grid)
     assert data.dimensions == (5 + wrap[0], 6 + wrap[1], 1)
-    found = qc.as_mesh(data, wrap)
+    found = qc.as_mesh(data, wrap=wrap)
     assert found.wrap == wrap
     np.testing.assert_array_equal(found.points, grid.points)
 
@@ -342,19 +340,41 @@ def test_seams_of_grids_are_reported_and_closed_on_request(torus):
     with pytest.warns(UserWarning, match="coincide: it is open along a seam") as warned:
         as_mesh(data)
     assert [str(w.message).split()[3] for w in warned] == ["rows", "columns"]
-    open_ = QuadGrid(np.random.default_rng(0).random((4, 5, 3))).to_pyvista()
+    open_ = qc.to_pyvista(QuadGrid(np.random.default_rng(0).random((4, 5, 3))))
     with pytest.raises(MeshError, match=r"first and last columns differ by .* although they wrap"):
         qc.as_mesh(open_, wrap=(False, True))
 
 
-def test_pyvista_types_that_another_verb_takes():
-    grid = QuadGrid(np.random.default_rng(0).random((4, 5, 3))).to_pyvista()
-    with pytest.raises(TypeError, match=r"use QuadGrid\.from_pyvista"):
-        qc.as_mesh(grid)
-    with pytest.raises(TypeError, match=r"expected a pyvista.StructuredGrid, got PolyData"):
-        qc.as_mesh(pv.Plane())
-    with pytest.raises(TypeError, match="expected a PolyData, StructuredGrid"):
-        qc.as_mesh(trimesh.creation.box())
+@pytest.mark.parametrize(
+    ("thing", "kind"),
+    [
+        (lambda: QuadMesh(POINTS, MIXED), "QuadMesh"),
+        (lambda: surfaces.torus().sample((4, 5))[0], "QuadGrid"),
+        (lambda: (POINTS, MIXED), "tuple"),
+        (lambda: pv.Plane(), "mesh that has its own"),
+        (lambda: qc.to_pyvista(QuadGrid(np.random.default_rng(0).random((4, 5, 3)))), "StructuredGrid"),
+    ],
+    ids=["QuadMesh", "QuadGrid", "tuple", "PolyData", "StructuredGrid"],
+)
+def test_quads_are_for_a_trimesh_alone(thing, kind):
+    with pytest.raises(TypeError, match=f"quads: only a Trimesh has triangles .*, not a {kind}"):
+        as_mesh(thing(), quads=[[0, 1, 4, 3]])
+
+
+@pytest.mark.parametrize(
+    ("thing", "kind"),
+    [
+        (lambda: QuadMesh(POINTS, MIXED), "QuadMesh"),
+        (lambda: surfaces.torus().sample((4, 5))[0], "QuadGrid"),
+        (lambda: (POINTS, MIXED), "tuple"),
+        (lambda: pv.Plane(), "face list"),
+        (lambda: trimesh.creation.box(), "face list"),
+    ],
+    ids=["QuadMesh", "QuadGrid", "tuple", "PolyData", "Trimesh"],
+)
+def test_wrap_is_for_a_structured_grid_alone(thing, kind):
+    with pytest.raises(TypeError, match=f"wrap: only a StructuredGrid has .*, not a {kind}"):
+        as_mesh(thing(), wrap=(True, False))
 
 
 def test_seams_of_face_lists_are_reported():
@@ -390,8 +410,8 @@ def test_meshlab_meshes_that_are_none(meshlab):
         as_mesh(meshlab.MeshSet())
     with pytest.raises(MeshError, match="faces: none given"):
         as_mesh(meshlab.Mesh(POINTS))
-    with pytest.raises(TypeError, match=r"expected a pymeshlab.MeshSet or Mesh, got PolyData"):
-        qc.as_mesh(pv.Plane())
+    with pytest.raises(TypeError, match=r"expected a pymeshlab.MeshSet or Mesh, got"):
+        as_mesh(meshlab.PercentageValue(3))
 
 
 def test_without_meshlab_its_extra_is_named(monkeypatch, mesh):
@@ -472,7 +492,7 @@ def test_results_in_meshlab(meshlab, mesh):
 
 
 def test_results_that_do_not_fit(meshlab, mesh):
-    grid = QuadGrid(np.random.default_rng(0).random((7, 6, 3))).to_pyvista()
+    grid = qc.to_pyvista(QuadGrid(np.random.default_rng(0).random((7, 6, 3))))
     for target, n in (
         (qc.to_trimesh(mesh), 8),
         (qc.to_pyvista(mesh), 8),
@@ -555,7 +575,7 @@ import quadcurv
 from quadcurv import surfaces
 mesh = surfaces.torus().sample((4, 5), "faces")[0]
 quadcurv.write("{tmp_path}/a.vtp", mesh, {{"H": quadcurv.mean_curvature(mesh)}})
-quadcurv.read("{tmp_path}/a.vtp").to_pyvista().quadcurv.mean_curvature()
+quadcurv.to_pyvista("{tmp_path}/a.vtp").quadcurv.mean_curvature()
 print(*(m for m in sys.modules if "OpenGL" in m or m == "pyvista.plotting"))
 """
     run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)

@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+import tracemalloc
+
 import numpy as np
 import pytest
+import scipy
 import trimesh
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from quadcurv import (
     MeshError,
+    MeshWarning,
     QuadGrid,
     QuadMesh,
     Recovery,
@@ -21,7 +25,10 @@ from quadcurv import (
     read,
     surfaces,
 )
-from quadcurv.repair import quads_by_carrier, quads_by_order, split_quads
+from quadcurv.coincidence import first_at_place
+from quadcurv.io.base import FaceList
+from quadcurv.io.quads import quads_by_carrier, quads_by_order, split_quads
+from quadcurv.repair import flip, orient
 
 
 def same_faces(one, other):
@@ -255,14 +262,35 @@ def test_a_pole_of_quads_becomes_triangles():
     assert merged.stencils().ring_areas.sum(axis=0) == pytest.approx([0, 0, 0], abs=1e-12)
 
 
-def test_merging_drops_faces_without_three_places_and_rejects_what_is_no_mesh():
+def test_merging_drops_faces_without_three_places_and_tells_of_edges_of_many_faces():
     points = [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [0, 0, 0], [1, 0, 0]]
     merged, vertex = merge_points(QuadMesh(points, [[0, 1, 2, 3], [0, 4, 5, 1]]))
     assert merged.faces.tolist() == [[0, 1, 2, 3]]
     assert vertex.tolist() == [0, 1, 2, 3, 0, 1]
     book = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, -1, 0], [0, 0, 1], [0, 0, 0], [1, 0, 0]]
-    with pytest.raises(MeshError, match="more than two faces"):
+    with pytest.warns(MeshWarning, match="1 edge.s. with more than two faces"):
         merge_points(QuadMesh(book, [[0, 1, 2], [1, 0, 3], [5, 6, 4]]))
+
+
+def test_polygons_stay_polygons_where_points_are_merged_or_faces_turned():
+    angle = np.arange(5) * 2 * np.pi / 5
+    points = np.zeros((12, 3))
+    points[:5, :2] = np.stack((np.cos(angle), np.sin(angle)), axis=-1)
+    points[5:10, :2] = 2 * points[:5, :2]
+    points[10], points[11] = points[0], points[1]
+    mesh = QuadMesh(points, [[0, 5, 6, 1], [11, 6, 7, 2], [0, 1, 2, 3, 4], [10, 1, 11]])
+    merged, _ = merge_points(mesh)
+    assert [f.tolist() for f in np.split(*_csr(merged))] == [[0, 5, 6, 1], [1, 6, 7, 2], [0, 1, 2, 3, 4]]
+    assert [f.tolist() for f in np.split(*_csr(flip(merged)))] == [
+        [0, 1, 6, 5],
+        [1, 2, 7, 6],
+        [0, 4, 3, 2, 1],
+    ]
+
+
+def _csr(mesh):
+    faces = FaceList.of(mesh)
+    return faces.corners, np.cumsum(faces.sizes)[:-1]
 
 
 # -------------------------------------------------------------------------------------------- as_grid
@@ -376,3 +404,91 @@ def test_a_moebius_strip_and_corners_that_meet_are_no_grids():
     bent = QuadMesh(np.random.default_rng(0).random((9, 3)), faces)
     with pytest.raises(MeshError, match="some vertices lie at several places of its border"):
         as_grid(bent)
+
+
+# ----------------------------------------------------------------------------------- sides turned round
+
+
+@pytest.mark.parametrize("layout", ["faces", "grid", "staggered"])
+def test_flipping_changes_the_sign_and_twice_gives_the_mesh_back(layout):
+    mesh = surfaces.torus().sample((12, 8), layout)[0]
+    flipped = flip(mesh)
+    assert type(flipped) is type(mesh)
+    H, other = mean_curvature(mesh, "liu"), mean_curvature(flipped, "liu")
+    np.testing.assert_allclose(other if layout == "faces" else other.T, -H, rtol=1e-12)
+    if layout == "faces":
+        np.testing.assert_array_equal(flip(flipped).faces, mesh.faces)
+        np.testing.assert_array_equal(flipped.faces[:, 0], mesh.faces[:, 0])
+    else:
+        np.testing.assert_array_equal(mean_curvature(flip(flipped), "liu"), H)
+
+
+def test_closed_parts_are_turned_outward_and_open_ones_left():
+    sphere = surfaces.cubed_sphere().sample((4, 4), "faces")[0]
+    n, far = len(sphere.points), 1e6
+    inside_out, patch = sphere.faces[:, ::-1], sphere.faces[:20, ::-1]
+    cut = np.insert(np.concatenate((sphere.faces[:, [0, 1, 2]], sphere.faces[:, [0, 2, 3]])), 3, -1, axis=1)
+    cut = np.where(cut < 0, -1, cut[:, [2, 1, 0, 3]])
+    parts = [sphere.faces, inside_out, patch, cut]
+    points = np.concatenate([sphere.points + far * k * np.eye(3)[0] for k in range(4)])
+    faces = np.concatenate([np.where(part < 0, -1, part + n * k) for k, part in enumerate(parts)])
+    mesh = QuadMesh(points, faces)
+    turned = orient(mesh)
+    H = mean_curvature(turned, "liu", "nan").reshape(4, n)
+    assert (H[[0, 1, 3]] > 0.5).all()
+    assert np.nanmax(H[2]) < -0.5
+    np.testing.assert_array_equal(turned.faces[: len(sphere.faces)], sphere.faces)
+    assert orient(turned) is turned
+
+
+def test_what_has_no_outside_is_left_as_it_is(torus):
+    assert orient(torus) is torus
+    inner = orient(flip(torus))
+    np.testing.assert_allclose(mean_curvature(inner), mean_curvature(torus), rtol=1e-12)
+    tube = surfaces.catenoid().sample((5, 6))[0]
+    assert orient(tube) is tube
+    staggered = surfaces.torus().sample((6, 7), "staggered")[0]
+    assert orient(staggered) is staggered
+    twice = QuadMesh(np.eye(4, 3), [[0, 1, 2, 3], [0, 3, 2, 1]])  # closed, no volume
+    assert orient(twice) is twice
+
+
+def test_repairs_take_what_the_verbs_take(tmp_path):
+    box = trimesh.creation.box()
+    assert isinstance(flip(box), QuadMesh)
+    assert orient(box).faces.tolist() == QuadMesh(box.vertices, box.faces).faces.tolist()
+    assert len(pair_triangles(box).faces) == 6
+    torus = surfaces.torus().sample((5, 6))[0]
+    grid, _ = as_grid(torus)
+    np.testing.assert_array_equal(grid.points, torus.points)
+    assert (duplicate_points(torus) == np.arange(30)).all()
+    soup = trimesh.Trimesh(box.triangles.reshape(-1, 3), np.arange(36).reshape(-1, 3), process=False)
+    soup.export(tmp_path / "soup.obj")
+    # Neither warns of the seams that it is there to close.
+    assert len(merge_points(soup)[0].points) == len(merge_points(tmp_path / "soup.obj")[0].points) == 8
+
+
+def test_a_tolerance_as_large_as_the_mesh_costs_little_memory(rng):
+    points = np.concatenate((rng.random((22_500, 3)), [[5.0, 0, 0]]))
+    mesh = QuadMesh(points, [[0, 1, 2]])
+    tracemalloc.start()
+    try:
+        place = duplicate_points(mesh, 2.0)
+        peak = tracemalloc.get_traced_memory()[1]
+    finally:
+        tracemalloc.stop()
+    assert place.tolist() == [0] * 22_500 + [22_500]
+    assert peak < 20e6
+
+
+@settings(max_examples=200, deadline=None)
+@given(st.integers(0, 2**32 - 1), st.integers(1, 40), st.floats(-3, 0.5), st.booleans())
+def test_places_are_the_components_of_the_graph_of_near_points(seed, n, exponent, lattice):
+    rng = np.random.default_rng(seed)
+    points = rng.integers(0, 4, (n, 3)).astype(float) if lattice else rng.random((n, 3))
+    tolerance = float(rng.integers(1, 3)) if lattice else 10.0**exponent
+    near = scipy.spatial.distance.cdist(points, points) <= tolerance
+    _, first, of = np.unique(
+        scipy.sparse.csgraph.connected_components(near)[1], return_index=True, return_inverse=True
+    )
+    np.testing.assert_array_equal(first_at_place(points, tolerance), first[of])

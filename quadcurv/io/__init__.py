@@ -1,5 +1,16 @@
-"""Meshes of other libraries and files, as ours and back."""
+"""Meshes of other libraries and files, as ours and back.
 
-from quadcurv.io.libraries import as_mesh, attach, read, to_pymeshlab, to_pyvista, to_trimesh, write
+A format or a library is one file here, which ends in its registration line: every module of this package is
+imported, so that no list of them is to be kept.
+"""
 
-__all__ = ["as_mesh", "attach", "read", "to_pymeshlab", "to_pyvista", "to_trimesh", "write"]
+import importlib
+import pkgutil
+
+from quadcurv.io.meshes import as_mesh, read, read_values, write
+from quadcurv.io.others import attach, to_pymeshlab, to_pyvista, to_trimesh
+
+__all__ = ["as_mesh", "attach", "read", "read_values", "to_pymeshlab", "to_pyvista", "to_trimesh", "write"]
+
+for _module in pkgutil.iter_modules(__path__):
+    importlib.import_module(f"{__name__}.{_module.name}")

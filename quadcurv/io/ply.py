@@ -1,23 +1,20 @@
-"""OBJ, OFF and PLY files as points and polygons: plain arrays in and out, in double precision.
+"""PLY files, text and binary: polygons, doubles, and values at the vertices.
 
 The libraries at hand do not keep both polygons and doubles: trimesh splits polygons and cannot read
-binary PLY with faces of several sizes, VTK reads PLY in single precision, OBJ with vertices split at
-texture seams and OFF not at all, libigl wants faces of one size, plyfile is GPL.
+binary files with faces of several sizes, VTK reads single precision, plyfile is GPL.
 """
 
 from __future__ import annotations
 
-import re
-from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from quadcurv.types import Floats, Ints, MeshError
-
-Polygons = NDArray[np.int64] | list[list[int]]
+from quadcurv.io.base import Content, FaceList, Format, Values, polygons, register
+from quadcurv.mesh import QuadMesh
+from quadcurv.types import MeshError
 
 PlyElements = dict[str, tuple[int, list[tuple[str, ...]]]]
 PLY_TYPES = {
@@ -32,82 +29,7 @@ PLY_TYPES = {
 }
 
 
-def polygons(sizes: Sequence[int] | NDArray[Any], vertices: Sequence[int] | NDArray[Any]) -> Polygons:
-    """Faces of `sizes` corners each, listed one after the other in `vertices`.
-
-    Returns
-    -------
-    (m, 4) int64 or list of list of int
-        A table, -1 after the corners of a triangle, where all faces are triangles and quads.
-
-    Raises
-    ------
-    MeshError
-        A ValueError: an index that is negative (the table could not tell it from the mark of a triangle)
-        or, as text formats may have it, no whole number.
-    """
-    sizes, given = np.asarray(sizes, np.int64), np.asarray(vertices)
-    ends = np.cumsum(sizes)
-    if (sizes < 0).any() or sizes.sum() != len(given):
-        raise MeshError(f"faces: {len(given)} corners do not make {len(sizes)} faces of the sizes given")
-    with np.errstate(invalid="ignore"):
-        vertices = given.astype(np.int64)
-    bad = (vertices < 0) | (vertices != given)
-    if bad.any():
-        face = int(np.searchsorted(ends, np.argmax(bad), side="right"))
-        raise MeshError(f"faces: {np.count_nonzero(bad)} invalid indices, first face {face}: {given[bad][0]}")
-    if np.isin(sizes, (3, 4)).all():
-        table = np.full((len(sizes), 4), -1, np.int64)
-        table[np.arange(4) < sizes[:, None]] = vertices
-        return table
-    return [face.tolist() for face in np.split(vertices, ends[:-1])]
-
-
-def read_obj(path: Path) -> tuple[Floats, Polygons]:
-    """Positions and polygons of an OBJ file; texture and normal indices do not split vertices."""
-    points: list[list[float]] = []
-    sizes: list[int] = []
-    corners: list[int] = []
-    text = path.read_text(encoding="utf-8", errors="replace").replace("\\\n", " ")
-    for number, line in enumerate(text.splitlines(), 1):
-        kind, *words = line.partition("#")[0].split() or [""]
-        try:
-            if kind == "v":
-                x, y, z = map(float, words[:3])
-                points.append([x, y, z])
-            elif kind == "f":
-                sizes.append(len(words))
-                for word in words:
-                    index = int(word.partition("/")[0])
-                    # Counted from 1, or back from the last vertex read.
-                    corners.append(index - 1 if index > 0 else len(points) + index if index else -1)
-        except ValueError:
-            raise MeshError(f"line {number}: {line.strip()!r} is not OBJ") from None
-    return np.array(points, float).reshape(-1, 3), polygons(sizes, corners)
-
-
-def read_off(path: Path) -> tuple[Floats, Polygons]:
-    """Positions and polygons of an ASCII OFF file; normals and colours are skipped."""
-    text = path.read_text(encoding="utf-8", errors="replace")
-    lines = [line for raw in text.splitlines() if (line := raw.partition("#")[0].strip())]
-    start = re.match(r"(ST)?C?N?OFF\b(.*)", lines[0] if lines else "")
-    if not start or "BINARY" in start[2]:
-        raise MeshError("not an ASCII OFF file in three dimensions")
-    lines[:1] = [start[2]] if start[2].strip() else []
-    try:
-        n, m = map(int, lines[0].split()[:2])
-        points = np.array([line.split()[:3] for line in lines[1 : n + 1]], float).reshape(n, 3)
-        rows = [line.split() for line in lines[n + 1 : n + m + 1]]
-        sizes = [int(row[0]) for row in rows]
-        faces = [[int(v) for v in row[1 : size + 1]] for row, size in zip(rows, sizes, strict=True)]
-        if len(rows) != m or [len(face) for face in faces] != sizes:
-            raise ValueError("the face list is cut short")
-    except (ValueError, IndexError) as error:
-        raise MeshError(f"not an OFF file: {error}") from None
-    return points, polygons(sizes, [v for face in faces for v in face])
-
-
-def read_ply(path: Path) -> tuple[Floats, Polygons]:
+def read_ply(path: Path) -> Content:
     """Positions and polygons of a PLY file, ASCII or binary."""
     header, _, body = path.read_bytes().partition(b"end_header")
     try:
@@ -128,7 +50,7 @@ def read_ply(path: Path) -> tuple[Floats, Polygons]:
         raise MeshError(f"not a PLY file: {error}") from None
     except KeyError as error:
         raise MeshError(f"not a PLY file of a mesh: no {error}") from None
-    return points, polygons(sizes, corners)
+    return Content(points, polygons(sizes, corners))
 
 
 def _ply_header(header: str) -> tuple[str, PlyElements]:
@@ -198,23 +120,7 @@ def _ply_element(
     return columns, offset
 
 
-def write_obj(path: Path, points: Floats, faces: Ints) -> None:
-    """OBJ with every digit of the positions."""
-    lines = ["v " + " ".join(map(repr, point)) for point in points.tolist()]
-    lines += ["f " + " ".join(str(v + 1) for v in face if v >= 0) for face in faces.tolist()]
-    path.write_text("\n".join(lines) + "\n", encoding="ascii")
-
-
-def write_off(path: Path, points: Floats, faces: Ints) -> None:
-    """OFF with every digit of the positions."""
-    lines = ["OFF", f"{len(points)} {len(faces)} 0"]
-    lines += [" ".join(map(repr, point)) for point in points.tolist()]
-    polygon = [[v for v in face if v >= 0] for face in faces.tolist()]
-    lines += [" ".join(map(str, (len(face), *face))) for face in polygon]
-    path.write_text("\n".join(lines) + "\n", encoding="ascii")
-
-
-def write_ply(path: Path, points: Floats, faces: Ints, point_data: Mapping[str, NDArray[Any]]) -> None:
+def write_ply(path: Path, mesh: QuadMesh, point_data: Values) -> None:
     """Binary PLY; values (n,) as a property of that name, (n, 3) as name_x, name_y, name_z.
 
     Values named "normal" or "normals" become nx, ny, nz, which other readers take for normals. Booleans
@@ -225,6 +131,7 @@ def write_ply(path: Path, points: Floats, faces: Ints, point_data: Mapping[str, 
     MeshError
         A ValueError: names that repeat, or are no words of ASCII.
     """
+    points, faces = mesh.points, FaceList.of(mesh)
     columns = dict(zip("xyz", points.T, strict=True))
     for name, values in point_data.items():
         if values.ndim == 1:
@@ -246,13 +153,17 @@ def write_ply(path: Path, points: Floats, faces: Ints, point_data: Mapping[str, 
     spelled = {"u1": "uchar", "i4": "int", "f8": "double"}
     header = ["ply", "format binary_little_endian 1.0", f"element vertex {len(points)}"]
     header += [f"property {spelled[vertices.dtype[k].str[1:]]} {k}" for k in columns]
-    header += [f"element face {len(faces)}", "property list uchar int vertex_indices", "end_header", ""]
-    corner = faces >= 0
-    rows = np.empty((len(faces), 17), np.uint8)
-    rows[:, 0] = corner.sum(axis=1)
-    rows[:, 1:] = faces.astype("<i4").view(np.uint8)
-    kept = np.repeat(np.c_[corner[:, :1], corner], [1, 4, 4, 4, 4], axis=1)
-    path.write_bytes("\n".join(header).encode("ascii") + vertices.tobytes() + rows[kept].tobytes())
+    small = faces.sizes.max() < 256
+    header += [f"element face {len(faces.sizes)}"]
+    header += [f"property list {'uchar' if small else 'int'} int vertex_indices", "end_header", ""]
+    begin = np.cumsum(faces.sizes) - faces.sizes
+    corners = faces.corners.astype("<i4")
+    rows = (
+        np.insert(corners.view(np.uint8), 4 * begin, faces.sizes)
+        if small
+        else np.insert(corners, begin, faces.sizes)
+    )
+    path.write_bytes("\n".join(header).encode("ascii") + vertices.tobytes() + rows.tobytes())
 
 
 def _ply_type(values: NDArray[Any]) -> str:
@@ -264,8 +175,4 @@ def _ply_type(values: NDArray[Any]) -> str:
     return "<f8"
 
 
-READERS: dict[str, Callable[[Path], tuple[Floats, Polygons]]] = {
-    ".obj": read_obj,
-    ".off": read_off,
-    ".ply": read_ply,
-}
+register(Format((".ply",), read_ply, write_ply, holds_values=True))

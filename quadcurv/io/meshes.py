@@ -1,0 +1,267 @@
+"""as_mesh, read and write: whatever holds a mesh as one of ours, and ours as a file or another library's."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from quadcurv.io.base import FORMATS, Content, checked_values, library, warn
+from quadcurv.io.seams import closed_grid, warn_of_seam
+from quadcurv.mesh import Mesh, QuadGrid, QuadMesh, Recovery, StaggeredGrid
+from quadcurv.types import MeshError
+
+Wrap = Sequence[bool]
+
+
+def as_mesh(mesh: Any, quads: ArrayLike | None = None, wrap: Wrap | None = None) -> Mesh:
+    """Make a mesh of anything that holds one.
+
+    Parameters
+    ----------
+    mesh : object
+        One of
+
+        - QuadMesh, QuadGrid, StaggeredGrid: returned as they are;
+        - trimesh.Trimesh, or a Scene of one: its triangles are paired into the quads they were cut from,
+          see Notes;
+        - pyvista.PolyData, or UnstructuredGrid of polygons;
+        - pyvista.StructuredGrid of one layer: a QuadGrid, indexed (i, j) whereas VTK runs through j first;
+        - pymeshlab.MeshSet (its current mesh) or Mesh: faux edges join triangles to polygons;
+        - a path: see :func:`read`;
+        - a tuple (points, faces): the arguments of QuadMesh.
+    quads : (m, 4) array_like of int or sequence of polygons, optional
+        The faces of a Trimesh, where the caller knows them.
+    wrap : (bool, bool), optional
+        Which directions of a StructuredGrid are closed; its last row (column) then repeats the first and is
+        left out.
+
+    Returns
+    -------
+    QuadMesh, QuadGrid or StaggeredGrid
+        Vertices in the order of `mesh`, double precision; nothing of `mesh` is modified.
+
+    Raises
+    ------
+    MeshError
+        A ValueError: the content is not a surface mesh.
+    OSError
+        A path that cannot be opened.
+    TypeError
+        None of these types; `quads` for what is no Trimesh, `wrap` for what is no StructuredGrid.
+
+    Warns
+    -----
+    MeshWarning
+        Boundary vertices coincide, so that the mesh is open although it looks closed; cells were left out.
+
+    Notes
+    -----
+    trimesh cuts a quad (a, b, c, d) into (a, b, c) and (c, d, a). They are joined again by the first of
+    these rules that applies; it is named in the mesh's ``recovery``:
+
+    - "given": by `quads`;
+    - "carrier": the face attribute that :func:`to_trimesh` leaves; it survives shuffling and copies;
+    - "ply": the polygons of the PLY file that the Trimesh was loaded from;
+    - "block", "interleaved", "diagonal": by the order of the triangles, or by their closing edges;
+    - "none": they are triangles. :func:`quadcurv.pair_triangles` pairs them by their shape.
+    """
+    return opened(mesh, quads, wrap)
+
+
+def opened(mesh: Any, quads: Any = None, wrap: Wrap | None = None, seams: bool = True) -> Mesh:
+    """As as_mesh, without the warning of seams for who is about to close them."""
+    if isinstance(mesh, QuadMesh | QuadGrid | StaggeredGrid):
+        _refuse(quads, wrap, type(mesh).__name__)
+        return mesh
+    if isinstance(mesh, str | os.PathLike):
+        try:
+            return _made(_content(mesh), quads, wrap, seams)
+        except MeshError as error:
+            raise MeshError(f"{os.fspath(mesh)}: {error}") from error.__cause__
+    if isinstance(mesh, tuple) and len(mesh) == 2:
+        _refuse(quads, wrap, "tuple")
+        return QuadMesh(*mesh)
+    entry = library(mesh)
+    if entry is None:
+        raise TypeError(
+            "mesh: expected a quadcurv mesh, a mesh of trimesh, pyvista or pymeshlab, a path or a tuple "
+            f"(points, faces), got {type(mesh).__name__}"
+        )
+    return _made(entry.content(mesh), quads, wrap, seams)
+
+
+def _refuse(quads: Any, wrap: Any, kind: str) -> None:
+    if quads is not None:
+        raise TypeError(f"quads: only a Trimesh has triangles to take them for, not a {kind}")
+    if wrap is not None:
+        raise TypeError(f"wrap: only a StructuredGrid has directions to wrap, not a {kind}")
+
+
+def _made(content: Content, quads: Any, wrap: Wrap | None, seams: bool) -> QuadMesh | QuadGrid:
+    """The mesh of what was read, with all that there is to warn of."""
+    for note in content.notes:
+        warn(note)
+    if content.faces is None:
+        _refuse(quads, None, "StructuredGrid")
+        return closed_grid(content.points, wrap, seams)
+    _refuse(None, wrap, "face list")
+    faces, recovery = content.faces, None
+    if content.pairing is None:
+        _refuse(quads, None, "mesh that has its own")
+    else:
+        rule, n_triangles = content.pairing
+        if quads is not None:
+            faces, rule = quads, "given"
+        recovery = Recovery(rule, 2 * _count_quads(faces) / max(n_triangles, 1))
+    mesh = QuadMesh(content.points, faces)
+    if recovery is not None:
+        mesh = mesh.with_recovery(recovery)
+    if seams:
+        warn_of_seam(mesh)
+    return mesh
+
+
+def _count_quads(faces: Any) -> int:
+    if isinstance(faces, np.ndarray) and faces.ndim == 2:
+        return int(np.count_nonzero(faces[:, 3] >= 0)) if faces.shape[1] == 4 else 0
+    return sum(len(face) == 4 and face[3] >= 0 for face in faces)
+
+
+def read(
+    path: str | os.PathLike[str], quads: ArrayLike | None = None, wrap: Wrap | None = None
+) -> QuadMesh | QuadGrid:
+    """Read a mesh file; quads and polygons are kept wherever the format has them.
+
+    Parameters
+    ----------
+    path : path-like
+        ==================  ==============================  =====================================
+        suffix              quads and polygons              positions
+        ==================  ==============================  =====================================
+        .obj                kept                            double
+        .off (ASCII)        kept                            double
+        .ply                kept                            as the file has them, up to double
+        .vtp .vtu .vtk      kept                            as the file has them, up to double
+        .vts .vtk           a grid: QuadGrid                as the file has them, up to double
+        .stl                triangles                       single; its corners are merged
+        .glb .gltf          triangles, or quads again       single
+                            as from a Trimesh
+        ==================  ==============================  =====================================
+    quads, wrap
+        As in :func:`as_mesh`, for .glb and .gltf, and for grids.
+
+    Returns
+    -------
+    QuadMesh or QuadGrid
+        Vertices as in the file; none is merged (but for STL, which repeats every corner) and none is
+        split where only texture coordinates or normals differ (but for GLB, which stores them so).
+
+    Raises
+    ------
+    MeshError
+        A ValueError: the file holds no surface mesh, or not one of these formats.
+    OSError
+        It cannot be opened.
+
+    Warns
+    -----
+    MeshWarning
+        Boundary vertices coincide: see :func:`quadcurv.merge_points`; cells were left out.
+    """
+    return opened(Path(path), quads, wrap)  # type: ignore[return-value]
+
+
+def read_values(path: str | os.PathLike[str]) -> dict[str, NDArray[Any]]:
+    """Values that a mesh file holds at its vertices, by name.
+
+    Parameters
+    ----------
+    path : path-like
+        A file that :func:`read` reads.
+
+    Returns
+    -------
+    dict of str to (n,) or (n, k) array
+        As stored; of a grid (r, c) or (r, c, k). Empty where the format holds none.
+
+    Raises
+    ------
+    MeshError, OSError
+        As :func:`read`.
+    """
+    try:
+        return dict(_content(path).values)
+    except MeshError as error:
+        raise MeshError(f"{os.fspath(path)}: {error}") from error.__cause__
+
+
+def _content(path: str | os.PathLike[str]) -> Content:
+    path = Path(path)
+    path.open("rb").close()
+    suffix = path.suffix.lower()
+    if suffix not in FORMATS or (reader := FORMATS[suffix].read) is None:
+        readable = sorted(name for name, entry in FORMATS.items() if entry.read)
+        raise MeshError(f"cannot read {suffix or 'a file without suffix'}; there are {', '.join(readable)}")
+    return reader(path)
+
+
+def write(path: str | os.PathLike[str], mesh: Any, point_data: Mapping[str, ArrayLike] | None = None) -> None:
+    """Write a mesh file with values at its vertices.
+
+    Parameters
+    ----------
+    path : path-like
+        ========  ======  ============  ========================================================
+        suffix    quads   positions     values
+        ========  ======  ============  ========================================================
+        .ply      kept    double        double; vectors as NAME_x, NAME_y, NAME_z, but "normal"
+                                        as nx, ny, nz. Integers and booleans stay such.
+                                        Of scalars MeshLab reads the one named "quality"
+        .vtp      kept    double        as they are
+        .obj      kept    double        none
+        .off      kept    double        none
+        .glb      cut     single        single, finite only, as _NAME; the first scalars also as
+                                        colours. :func:`read` puts the quads together again
+        ========  ======  ============  ========================================================
+
+    mesh : object
+        Anything :func:`as_mesh` takes but a StaggeredGrid; a grid is written as its faces, row by row.
+    point_data : mapping of str to (n,) or (n, 3) array_like
+        Of a grid (r, c) or (r, c, 3).
+
+    Raises
+    ------
+    MeshError
+        A ValueError: values of another shape, or that the format cannot hold; an unknown suffix.
+    OSError
+        It cannot be written.
+    """
+    path = Path(path)
+    mesh = as_mesh(mesh)
+    shape = mesh.shape if isinstance(mesh, QuadGrid) else (len(face_list(mesh).points),)
+    data = {
+        name: checked_values(name, np.asarray(values), shape) for name, values in (point_data or {}).items()
+    }
+    data = {name: v.reshape(-1, *v.shape[len(shape) :]) for name, v in data.items()}
+    surface = face_list(mesh)
+    suffix = path.suffix.lower()
+    if suffix not in FORMATS or (writer := FORMATS[suffix].write) is None:
+        known = ", ".join(sorted(name for name, entry in FORMATS.items() if entry.write))
+        raise MeshError(f"{path}: cannot write {suffix or 'a file without suffix'}; there are {known}")
+    if data and not FORMATS[suffix].holds_values:
+        known = ", ".join(sorted(name for name, entry in FORMATS.items() if entry.holds_values))
+        raise MeshError(f"point_data: {suffix} holds no values; {known} do")
+    writer(path, surface, data)
+
+
+def face_list(mesh: Any, seams: bool = True) -> QuadMesh:
+    """Anything that as_mesh takes as a QuadMesh; a StaggeredGrid is none."""
+    mesh = opened(mesh, seams=seams)
+    if isinstance(mesh, StaggeredGrid):
+        raise MeshError("mesh: a StaggeredGrid is no face list")
+    return mesh.to_mesh() if isinstance(mesh, QuadGrid) else mesh

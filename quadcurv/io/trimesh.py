@@ -1,0 +1,114 @@
+"""Meshes of trimesh, whose quads are cut into triangles, and back."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from quadcurv.io.base import Content, Library, checked_values, is_a, register
+from quadcurv.io.quads import quads_by_carrier, quads_by_order, split_quads
+from quadcurv.mesh import QuadMesh
+from quadcurv.types import MeshError
+
+CARRIER = "quadcurv"  # face attribute of a Trimesh that says which quad a triangle was cut from
+
+
+def content(mesh: Any) -> Content:
+    """Quads by, in this order: our own carrier, the PLY file loaded, the order of the triangles."""
+    mesh = sole_geometry(mesh)
+    triangles = np.asarray(mesh.faces)
+    faces, rule = _recovered(mesh, triangles)
+    values = {
+        name: np.asarray(v) for name, v in mesh.vertex_attributes.items() if len(v) == len(mesh.vertices)
+    }
+    return Content(np.asarray(mesh.vertices), faces, values, (rule, len(triangles)))
+
+
+def sole_geometry(mesh: Any) -> Any:
+    """The one Trimesh of a scene, where it stands there; a Trimesh itself."""
+    if is_a(mesh, "Trimesh"):
+        return mesh
+    if not is_a(mesh, "Scene"):
+        raise TypeError(f"mesh: expected a trimesh.Trimesh or a Scene of one, got {type(mesh).__name__}")
+    nodes = list(mesh.graph.nodes_geometry)
+    if len(nodes) != 1:
+        hint = "; to_mesh() joins them" if nodes else ""
+        raise MeshError(f"mesh: a Scene of {len(nodes)} geometries, expected one{hint}")
+    transform, name = mesh.graph[nodes[0]]
+    if not is_a(mesh.geometry[name], "Trimesh"):
+        raise TypeError(f"mesh: a Scene of a {type(mesh.geometry[name]).__name__}, expected a Trimesh")
+    return mesh.geometry[name].copy().apply_transform(transform)
+
+
+def _recovered(mesh: Any, triangles: NDArray[np.int64]) -> tuple[Any, str]:
+    """Faces of a Trimesh, the quads it was given or loaded with put together again, and by which rule."""
+    if triangles.size and triangles.min() < 0:  # left to QuadMesh to name
+        return triangles, "none"
+    carrier = np.asarray(mesh.face_attributes.get(CARRIER, ()))
+    if carrier.shape == (len(triangles),) and carrier.dtype.kind in "iu":
+        return quads_by_carrier(triangles, carrier), "carrier"
+    if (polygons := _ply_polygons(mesh)) is not None:
+        return polygons, "ply"
+    return quads_by_order(triangles)
+
+
+def _ply_polygons(mesh: Any) -> Any:
+    """Polygons of the PLY file that a Trimesh was loaded from, if its triangles are still those."""
+    from trimesh.geometry import triangulate_quads
+
+    try:
+        data = mesh.metadata["_ply_raw"]["face"]["data"]
+        binary = isinstance(data, np.ndarray)
+        names = data.dtype.names if binary else data
+        name = next(name for name in ("vertex_indices", "vertex_index") if name in names)
+        table = data[name]["f1"] if binary else data[name]
+        polygons = table if np.ndim(table) == 2 else [list(map(int, face)) for face in table]
+        unchanged = np.array_equal(triangulate_quads(polygons), mesh.faces)
+    except (KeyError, TypeError, ValueError, AttributeError, IndexError, StopIteration):
+        return None
+    return polygons if unchanged and len(polygons) < len(mesh.faces) else None
+
+
+def from_mesh(mesh: QuadMesh) -> Any:
+    """A Trimesh of quads cut in two, which carries which quad each triangle was cut from."""
+    import trimesh
+
+    triangles, carrier = split_quads(mesh.faces)
+    return trimesh.Trimesh(mesh.points.copy(), triangles, process=False, face_attributes={CARRIER: carrier})
+
+
+def attach(mesh: Any, name: str, values: NDArray[Any], colormap: str | None) -> None:
+    """Vertex attributes, and colours for scalars."""
+    if not is_a(mesh, "Trimesh"):
+        raise TypeError(f"mesh: expected a Trimesh, got {type(mesh).__name__}")
+    values = checked_values(name, values, (len(mesh.vertices),))
+    mesh.vertex_attributes[name] = values.copy()
+    if colormap is not None and values.ndim == 1:
+        from trimesh.visual import ColorVisuals
+
+        mesh.visual = ColorVisuals(mesh, vertex_colors=colours(values, colormap))
+
+
+def colours(values: NDArray[Any], colormap: str) -> NDArray[np.uint8]:
+    """RGBA of scalars over the range from their 2nd to their 98th percentile; grey where not finite."""
+    from matplotlib import colormaps
+
+    if colormap not in colormaps:
+        raise ValueError(f"colormap: matplotlib has no {colormap!r}")
+    finite = np.isfinite(values)
+    rgba = np.full((len(values), 4), (128, 128, 128, 255), np.uint8)
+    if finite.any():
+        known = values[finite].astype(float)
+        low, high = np.percentile(known, (2, 98))
+        if not low < high:  # all but a few are equal
+            low, high = known.min(), known.max()
+        with np.errstate(over="ignore"):
+            rgba[finite] = colormaps[colormap](
+                np.clip((known - low) / ((high - low) or 1.0), 0, 1), bytes=True
+            )
+    return rgba
+
+
+register(Library(("trimesh",), content, attach))
