@@ -16,7 +16,6 @@ from quadcurv import (
     MeshError,
     QuadGrid,
     QuadMesh,
-    Recovery,
     as_mesh,
     attach,
     mean_curvature,
