@@ -24,6 +24,7 @@ from quadcurv import (
     surfaces,
     write,
 )
+from quadcurv.mesh import Recovery
 
 POINTS = np.pi * np.array(
     [[0, 0, 0], [1, 0, 0.1], [2, 0, 0], [0, 1, 0], [1, 1, 0.2], [2, 1, 0], [3, 0, 0.3], [3, 1, 0.1]]

@@ -16,7 +16,6 @@ from quadcurv import (
     MeshWarning,
     QuadGrid,
     QuadMesh,
-    Recovery,
     as_grid,
     duplicate_points,
     mean_curvature,
@@ -28,6 +27,7 @@ from quadcurv import (
 from quadcurv.coincidence import first_at_place
 from quadcurv.io.base import FaceList
 from quadcurv.io.quads import quads_by_carrier, quads_by_order, split_quads
+from quadcurv.mesh import Recovery
 from quadcurv.repair import flip, orient
 
 
