@@ -37,6 +37,9 @@ def cut(points: Floats, indptr: Indices, corners: Ints) -> tuple[Indices, Indice
     for k in np.unique(sizes):
         which = np.flatnonzero(sizes == k)
         polygons = corners[indptr[which, None] + np.arange(k)].astype(np.int64)
+        # From the least vertex on: of cuts that are equally good the same one, wherever a polygon begins.
+        turn = (np.arange(k) + polygons.argmin(axis=1)[:, None]) % k
+        polygons = np.take_along_axis(polygons, turn, axis=1)
         x = points[polygons] - points[polygons[:, :1]]  # an offset costs no digits
         slots = _best(x) if k <= _MOST else np.stack([_clipped(polygon) for polygon in x])
         pieces.append(np.take_along_axis(polygons[:, None], slots, axis=2).reshape(-1, 3))
