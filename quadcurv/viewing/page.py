@@ -12,13 +12,17 @@ import numpy as np
 from numpy.typing import ArrayLike, DTypeLike
 
 from quadcurv.comparison import Comparison
-from quadcurv.viewing import fields
-from quadcurv.viewing.fields import NAN_COLOUR, OVERLAYS, ZERO_COLOUR, Field
+from quadcurv.viewing.fields import FIELDS, Fields
+from quadcurv.viewing.geometry import OVERLAYS, viewpoint
+from quadcurv.viewing.scale import BARS, NAN_COLOUR, ZERO_COLOUR, Field
+from quadcurv.viewing.style import Style
 
 _UNDEFINED = -1e30  # what the page takes for NaN
 
 
-def save_page(comparison: Comparison, path: str | Path, field: str = "mean_curvature") -> None:
+def save_page(
+    comparison: Comparison, path: str | Path, field: str = "mean_curvature", style: Style | None = None
+) -> None:
     """Write one page with linked views, one a scheme, and every field to choose from.
 
     Parameters
@@ -26,18 +30,21 @@ def save_page(comparison: Comparison, path: str | Path, field: str = "mean_curva
     comparison : Comparison
     path : path-like
     field : str
-        The one of :func:`quadcurv.viewing.fields.names` to show first.
+        The one of :attr:`quadcurv.viewing.Fields.names` to show first.
+    style : Style
 
     Raises
     ------
     ValueError
-        Unknown field.
+        Unknown field; limits of the style that do not fit its scale.
     """
-    fields.field(comparison, field)
-    points, faces, on_cells = fields.drawn(comparison.mesh)
-    towards, up = fields.viewpoint(points)
+    style = style or Style()
+    fields = Fields(comparison)
+    first = style.applied(fields.field(field))
+    points, faces, on_cells = fields.drawn
+    towards, up = viewpoint(points, style.camera)
     arrays: dict[bytes, int] = {}
-    shown = [_field(name, fields.field(comparison, name), arrays) for name in fields.names(comparison)]
+    shown = [_field(name, first if name == field else fields.field(name), arrays) for name in fields.names]
     data = {
         "field": field,
         "schemes": comparison.schemes,
@@ -46,7 +53,7 @@ def save_page(comparison: Comparison, path: str | Path, field: str = "mean_curva
         "faces": _encode(faces, "<i4"),
         "valence": _encode(comparison.valence, "u1"),
         "areas": _encode(np.nan_to_num(comparison.areas), "<f4"),
-        "bars": fields.BARS,
+        "bars": BARS,
         "towards": towards.tolist(),
         "up": up.tolist(),
         "overlays": [
@@ -56,7 +63,7 @@ def save_page(comparison: Comparison, path: str | Path, field: str = "mean_curva
                 "lines": vertices.ndim == 2,
                 "vertices": _encode(vertices, "<u4"),
             }
-            for name, vertices in fields.overlays(comparison.mesh).items()
+            for name, vertices in fields.overlays.items()
         ],
         "undefined_colour": NAN_COLOUR,
         "zero_colour": ZERO_COLOUR,
@@ -78,7 +85,7 @@ def _field(name: str, field: Field, arrays: dict[bytes, int]) -> dict[str, Any]:
         values[scheme] = arrays.setdefault(array, len(arrays))
     return {
         "name": name,
-        "label": name.replace("_", " ") if name in fields.FIELDS else name,
+        "label": name.replace("_", " ") if name in FIELDS else name,
         "title": field.title,
         "limits": field.limits,
         "logarithmic": field.logarithmic,
