@@ -341,8 +341,8 @@ def _values(evaluation: Evaluation, scheme: Any, quantity: Quantity) -> Floats:
         return evaluation.mean_curvature(scheme)
     if quantity == "gaussian_curvature":
         return gaussian_curvature(evaluation.mesh, scheme)
-    found = principal_curvatures(evaluation.mesh, scheme)
-    return found.k1 if quantity == "k1" else found.k2
+    k1, k2, *_ = principal_curvatures(evaluation.mesh, scheme)
+    return k1 if quantity == "k1" else k2
 
 
 def _exact(surface: Surface, quantity: Quantity, xi: Floats, eta: Floats) -> Floats:
@@ -360,7 +360,7 @@ def _pairs(shapes: Iterable[int | tuple[int, int]]) -> tuple[tuple[int, int], ..
     pairs = []
     try:
         for shape in shapes:
-            r, c = (shape, shape) if np.ndim(shape) == 0 else shape  # type: ignore[misc]
+            r, c = shape if isinstance(shape, Sequence) and len(shape) == 2 else (shape, shape)
             pairs.append((operator.index(r), operator.index(c)))
             if min(pairs[-1]) < 1:
                 raise ValueError

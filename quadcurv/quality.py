@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from quadcurv.boundary import EXTRAPOLATED, INTERIOR, OPEN, boundary_treatment, roughness
 from quadcurv.curvature import mean_curvature
 from quadcurv.io import as_mesh
-from quadcurv.schemes import SCHEMES
+from quadcurv.schemes import SCHEMES, as_scheme
 from quadcurv.stencils import Stencils
 from quadcurv.types import Bools, Floats
 
@@ -104,7 +104,7 @@ def summary(mesh: Any, schemes: Iterable[str] | None = None, boundary: str = "ex
             for name, code in (("interior", INTERIOR), ("extrapolated", EXTRAPOLATED), ("open", OPEN))
         },
         "undefined": {
-            name: int(np.count_nonzero(np.isnan(mean_curvature(mesh, name, boundary))))
+            name: int(np.count_nonzero(np.isnan(mean_curvature(mesh, as_scheme(name), boundary))))
             for name in (SCHEMES if schemes is None else schemes)
         },
     }

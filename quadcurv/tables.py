@@ -60,7 +60,8 @@ def text_table(
 def text_tables(title: str, columns: Sequence[str], rows: Sequence[Sequence[str]]) -> list[Table]:
     """As many tables as the columns need to fit 80 columns of text, each with the first of them."""
     widths = [max(map(len, column)) + 1 for column in zip(columns, *rows, strict=True)]
-    tables, start = [], 1
+    tables: list[Table] = []
+    start = 1
     while start < len(columns) or not tables:
         end = start + 1
         while end < len(columns) and widths[0] + sum(widths[start : end + 1]) <= WIDTH:

@@ -129,8 +129,9 @@ def convergence_plot(
             rates[label] = rate = _fitted_line(axes, n, e, fit[label], style["color"])
             text = f"{label}: rate {rate:.2f}" if np.isfinite(rate) else label
         line = ("-" if i < len(COLOURS) else "--") if joined else "none"
-        size = {"linewidth": 1.2, "markersize": 4.5} if joined else {}
-        axes.plot(n, np.where(e == 0, np.nan, e), linestyle=line, label=text, **style, **size)
+        if joined:
+            style |= {"linewidth": 1.2, "markersize": 4.5}
+        axes.plot(n, np.where(e == 0, np.nan, e), linestyle=line, label=text, **style)
     for i, e in enumerate(errors.values()):
         zero = e == 0
         if zero.any():
@@ -138,8 +139,7 @@ def convergence_plot(
             axes.plot(n[zero], np.full(zero.sum(), floor), linestyle="none", fillstyle="none", **style)
             axes.set_ylim(bottom=floor)
     for k, edge in enumerate(sorted({size for span in (fit or {}).values() for size in span})):
-        label = None if k else "range of the fit"
-        axes.axvline(edge, color="0.4", linestyle="--", linewidth=0.9, label=label)
+        axes.axvline(edge, color="0.4", linestyle="--", linewidth=0.9, label=None if k else "range of the fit")
     top = max((e[-1] for e in errors.values() if e[-1] > 0), default=floor)
     for slope in slopes:
         _guide(axes, n, 4 * top, slope)

@@ -242,7 +242,7 @@ class View:
         groups: Any = [(row, slice(None)) for row in across]
         self.plotter: Any = pv.Plotter(
             shape=(len(heights), self._columns),
-            row_weights=heights,
+            row_weights=[round(height) for height in heights],
             groups=groups,
             border=False,
             off_screen=off_screen,
