@@ -10,17 +10,17 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
 from quadcurv import drivers
-from quadcurv.boundary import checked_boundary, stencils
+from quadcurv.boundary import checked_boundary, one_rings
 from quadcurv.curvature import dual_areas
 from quadcurv.drivers import direct
 from quadcurv.io import as_mesh
-from quadcurv.mesh import Mesh, StaggeredGrid
+from quadcurv.mesh import Mesh
 from quadcurv.precision import warn_of_rounding
 from quadcurv.schemes import SCHEMES, Fit, Scheme, as_scheme
 from quadcurv.stencils import Stencils
@@ -259,7 +259,7 @@ def compare(
         Exact mean curvature in 1 / length: a number, an array of the shape of the result, or a function
         of the points. Without it schemes are compared with their median, two with the first.
     boundary : {"extrapolate", "nan"}
-        See :func:`quadcurv.stencils`.
+        See :func:`quadcurv.one_rings`.
 
     Returns
     -------
@@ -276,81 +276,56 @@ def compare(
     mesh = as_mesh(mesh)
     chosen = schemes_of(SCHEMES if schemes is None else schemes)
     evaluation = Evaluation(mesh, boundary)
+    given = evaluation.given
+    if callable(exact):
+        exact = exact(mesh.in_shape(given.points[: given.n]))
+    valence = mesh.in_shape(given.valence)
     if exact is not None:
-        exact = _exact(mesh, exact, evaluation.shape)
+        exact = _fitting(exact, valence.shape)
     H, notes = {}, {}
-    for scheme in progress(chosen, "schemes", weight=evaluation.given.n * len(chosen)):
+    for scheme in progress(chosen, "schemes", weight=given.n * len(chosen)):
         try:
-            values = evaluation.mean_curvature(scheme)
+            H[scheme.name] = evaluation.mean_curvature(scheme)
         except Exception as error:  # of one scheme, which says nothing of the others
-            values = np.full(evaluation.given.shape, np.nan)
+            H[scheme.name] = np.full(valence.shape, np.nan)
             notes[scheme.name] = f"{type(error).__name__}: {error}"
-        H[scheme.name] = evaluation.placed(values, np.nan)
-    found = Comparison(
-        mesh,
-        H,
-        exact,
-        evaluation.placed(dual_areas(evaluation.mesh, "liu"), 0.0),
-        evaluation.placed(evaluation.given.valence, 0),
-        {scheme.name: scheme.reference or scheme.name for scheme in chosen},
-        notes,
-    )
+    families = {scheme.name: scheme.reference or scheme.name for scheme in chosen}
+    found = Comparison(mesh, H, exact, dual_areas(mesh, "liu"), valence, families, notes)
     warn_of_rounding(mesh, found.consensus)
     return found
 
 
 class Evaluation:
-    """A mesh with what schemes share on it: its stencils, made once.
-
-    A grid with holes is evaluated as the face list that it is.
-    """
+    """A mesh and what schemes share on it: its stencils, made once."""
 
     def __init__(self, mesh: Mesh, boundary: str) -> None:
-        self._holes = mesh.mask if drivers.has_holes(mesh) else None
-        self.mesh: Mesh = mesh.to_mesh() if drivers.has_holes(mesh) else mesh
+        self.mesh = mesh
         self.boundary = checked_boundary(boundary)
-        self.given = self.mesh.stencils()
-        self.shape = self.given.shape if self._holes is None else self._holes.shape
+        self.given = mesh.stencils()
 
     @cached_property
-    def treated(self) -> Stencils:
+    def closed(self) -> Stencils:
         """Stencils with their boundary closed."""
-        return stencils(self.mesh, self.boundary)
+        return one_rings(self.mesh, self.boundary)
 
     def mean_curvature(self, scheme: Scheme) -> Floats:
-        """H in the shape of the stencils."""
+        """H in the shape of results."""
         if isinstance(scheme, Fit):
             return drivers.fit(self.mesh, scheme, self.boundary).mean
         if scheme.fast is not None:
             return drivers.run(self.mesh, scheme, ["mean_curvature"], self.boundary)["mean_curvature"]
         H = np.empty(self.given.shape)
-        direct.evaluate(self.given, self.treated, scheme, {"mean_curvature": H})
-        return H
-
-    def placed(self, values: NDArray[Any], fill: float) -> NDArray[Any]:
-        """Values of the shape of a result; `fill` where a grid has no point."""
-        if self._holes is None:
-            return values.reshape(self.shape)
-        full = np.full(self.shape, fill, values.dtype)
-        full[~self._holes] = values
-        return full
+        direct.evaluate(self.given, self.closed, scheme, {"mean_curvature": H})
+        return self.mesh.in_shape(H.ravel())
 
 
-def _exact(mesh: Mesh, exact: ArrayLike | Callable[[Floats], ArrayLike], shape: tuple[int, ...]) -> Floats:
-    if callable(exact):
-        exact = exact(_vertices(mesh))
+def _fitting(exact: ArrayLike, shape: tuple[int, ...]) -> Floats:
     try:
         return np.broadcast_to(np.asarray(exact, np.float64), shape)
     except (TypeError, ValueError):
         raise ValueError(
             f"exact: expected numbers that fit the result's {shape}, got shape {np.shape(exact)}"
         ) from None
-
-
-def _vertices(mesh: Mesh) -> Floats:
-    if not isinstance(mesh, StaggeredGrid):
-        return mesh.points
-    return mesh.primal[1:-1, 1:-1] if mesh.has_ghosts else mesh.primal
 
 
 def schemes_of(schemes: str | Scheme | Iterable[str | Scheme]) -> Sequence[Scheme]:

@@ -139,7 +139,9 @@ def convergence_plot(
             axes.plot(n[zero], np.full(zero.sum(), floor), linestyle="none", fillstyle="none", **style)
             axes.set_ylim(bottom=floor)
     for k, edge in enumerate(sorted({size for span in (fit or {}).values() for size in span})):
-        axes.axvline(edge, color="0.4", linestyle="--", linewidth=0.9, label=None if k else "range of the fit")
+        axes.axvline(
+            edge, color="0.4", linestyle="--", linewidth=0.9, label=None if k else "range of the fit"
+        )
     top = max((e[-1] for e in errors.values() if e[-1] > 0), default=floor)
     for slope in slopes:
         _guide(axes, n, 4 * top, slope)
