@@ -15,10 +15,12 @@ from cyclopts import App, CycloptsError, Parameter
 from rich.console import Console
 
 import quadcurv
+from quadcurv.boundary import boundary_treatment
 from quadcurv.comparison import Comparison
-from quadcurv.io import write
+from quadcurv.curvature import mean_curvature, vertex_normals
+from quadcurv.io import read, write
 from quadcurv.mesh import Mesh
-from quadcurv.schemes import SCHEMES
+from quadcurv.schemes import SCHEMES, as_scheme
 from quadcurv.tables import write_csv
 from quadcurv.viewing.fields import FIELDS
 
@@ -117,12 +119,12 @@ def curvature(
     """
     from quadcurv.quality import quality
 
-    found = quadcurv.read(mesh)
-    H = quadcurv.mean_curvature(found, scheme)
+    found = read(mesh)
+    H = mean_curvature(found, as_scheme(scheme))
     data: dict[str, Any] = {
         "mean_curvature": H,
-        "Normals": quadcurv.vertex_normals(found),
-        "boundary": quadcurv.boundary_treatment(found),
+        "Normals": vertex_normals(found),
+        "boundary": boundary_treatment(found),
         **quality(found),
     }
     if output.suffix.lower() == ".csv":
@@ -271,7 +273,7 @@ def _counts(mesh: Mesh) -> str:
 def _comparison(mesh: str | Path, scheme: list[str] | None) -> Comparison:
     from quadcurv.comparison import compare
 
-    return compare(quadcurv.read(mesh), scheme)
+    return compare(read(mesh), scheme)
 
 
 def _refinements(name: str, scheme: list[str] | None) -> Callable[[int], Comparison] | None:
