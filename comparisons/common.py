@@ -9,17 +9,15 @@ from typing import Any, Literal
 import matplotlib as mpl
 import numpy as np
 from cycler import cycler
-from matplotlib.cm import ScalarMappable
-from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from rich.console import Console
 from rich.table import Table
 
 from quadcurv import tables, viewing
 from quadcurv.comparison import Comparison
 from quadcurv.curvature import dual_areas
-from quadcurv.mesh import Mesh, QuadGrid, StaggeredGrid
+from quadcurv.mesh import Mesh
 from quadcurv.viewing.figures import COLOURS
 from quadcurv.viewing.figures import MARKERS as MARKERS
 from quadcurv.viewing.figures import convergence_plot as convergence_plot
@@ -174,22 +172,7 @@ def save_maps(
         for i, (title, (mesh, values)) in enumerate(panels.items(), 1):
             viewing.save_maps(_as_error(mesh, title, values), output / f"{stem}_{i}.html")
         return problem
-    images = {title: _picture(*panel, decades, camera) for title, panel in panels.items()}
-    widths = [image.shape[1] / image.shape[0] for image in images.values()]
-    width = 0.9 * height * sum(widths) + 0.3 * len(images) + (0.9 if decades else 0)
-    fig, axes = figure(1, len(images), (width, height), width_ratios=widths, squeeze=False)
-    for ax, (title, image) in zip(axes.flat, images.items(), strict=True):
-        ax.imshow(image, interpolation="antialiased")
-        ax.set_title(title)
-        ax.axis("off")
-    if decades is not None:
-        low, high = (10.0**power for power in decades)
-        known = np.array([row[-1] for row in table])
-        ends = {(True, True): "both", (True, False): "min", (False, True): "max"}
-        extend = ends.get((bool((known < low).any()), bool((known > high).any())), "neither")
-        scale = ScalarMappable(LogNorm(low, high), MAP)
-        fig.colorbar(scale, ax=axes, label=label, extend=extend, shrink=0.8, aspect=25, pad=0.03)
-    save_figure(fig, output, stem)
+    save_figure(viewing.surfaces_figure(panels, label, decades, camera, height), output, stem)
     return None
 
 
@@ -199,42 +182,6 @@ def _as_error(mesh: Mesh, title: str, values: ArrayLike) -> Comparison:
     e = np.reshape(values, stencils.shape)
     valence = stencils.valence.reshape(stencils.shape)
     return Comparison(mesh, {title: e}, np.zeros(stencils.shape), dual_areas(mesh, "liu"), valence)
-
-
-def _picture(
-    mesh: Mesh, given: ArrayLike, decades: tuple[int, int] | None, camera: tuple[float, ...]
-) -> NDArray[np.uint8]:
-    """Painted surface, without the empty margin; edges are drawn where they can be told apart."""
-    import pyvista as pv
-
-    corners = QuadGrid(mesh.dual) if isinstance(mesh, StaggeredGrid) else mesh
-    stencils = corners.stencils()
-    surface = pv.PolyData.from_regular_faces(np.array(stencils.points), stencils.faces.astype(int))
-    values = np.ravel(given)
-    mapper: dict[str, Any] = {"smooth_shading": True, "specular": 0.2, "ambient": 0.25}
-    if decades is not None:
-        values = np.log10(np.maximum(values, 10.0 ** decades[0]))
-        mapper = {"lighting": False, "clim": decades}
-    (surface.cell_data if isinstance(mesh, StaggeredGrid) else surface.point_data)["value"] = values
-    with pv.vtk_verbosity("off"):  # it would warn of every way to draw that it tries in vain
-        plotter: Any = pv.Plotter(off_screen=True, window_size=[1200, 1200])
-        plotter.enable_parallel_projection()
-        plotter.enable_anti_aliasing("msaa")
-        plotter.add_mesh(
-            surface,
-            scalars="value",
-            cmap=MAP,
-            show_edges=surface.n_cells <= 20_000,
-            edge_opacity=0.25,
-            nan_color="#d0d0d0",
-            show_scalar_bar=False,
-            **mapper,
-        )
-        plotter.view_vector(camera, viewup=(0, 0, 1))
-        image = np.asarray(plotter.screenshot(transparent_background=True, return_img=True))
-        plotter.close()
-    rows, columns = (np.flatnonzero(image[..., 3].any(axis=axis)) for axis in (1, 0))
-    return image[rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1]
 
 
 def arguments(description: str | None) -> argparse.Namespace:

@@ -10,8 +10,10 @@ import numpy as np
 import pytest
 from maps import differences, is_like, made_up, on_ellipsoid, on_pillow, pixels
 
-from quadcurv import viewing
+from quadcurv import QuadMesh, viewing
+from quadcurv.comparison import compare
 from quadcurv.viewing import Fields
+from quadcurv.viewing import page as page_module
 
 
 @pytest.fixture(scope="module")
@@ -202,3 +204,60 @@ def test_no_name_of_a_scheme_breaks_the_page(browser, tmp_path):
     name = "</script><b>@DATA@"
     viewing.save_maps(made_up(**{name: [1.0, 2.0, 3.0, 4.0]}), tmp_path / "name.html")
     assert Page(browser, tmp_path / "name.html").text("#views > div") == name
+
+
+def test_valence_and_values_beyond_what_a_byte_and_single_precision_hold(browser, tmp_path):
+    """A fan of 300 triangles 1e-45 across: H and its scale are of 1e45, positions far below 1e-38."""
+    t = 2 * np.pi * np.arange(300) / 300
+    rim = np.stack((np.cos(t), np.sin(t), 0 * t), axis=-1)
+    fan = [[300, k, (k + 1) % 300] for k in range(300)]
+    small = QuadMesh(1e-45 * np.vstack((rim, [[0, 0, 0.2]])), fan)
+    found = compare(small, ["cotan-6"])
+    height = found.mean_curvature["cotan-6"][300]
+    assert height > 1e43
+    viewing.save_maps(found, tmp_path / "fan.html", "mean_curvature")
+    page = Page(browser, tmp_path / "fan.html")
+    page.actions().move_to_element_with_offset(page.all("#views > div")[0], 0, 0).click().perform()
+    assert page.text("#picked") in ("vertex 300, valence 300", "")
+    page.browser.execute_script("picked = 300; report();")
+    assert page.text("#picked") == "vertex 300, valence 300"
+    assert float(page.text("#views > div").split(": ")[1]) == pytest.approx(height, rel=1e-3)
+    assert coloured(page.pictures(tmp_path / "fan.png")[0]).mean() > 0.01
+
+
+def test_style_of_a_page(browser, ellipsoid, tmp_path):
+    style = viewing.Style(
+        camera=(0, 0, 1), limits=(1e-4, 2e-2), colours="magma", title="A <b>title</b>", shading=True
+    )
+    viewing.save_maps(ellipsoid, tmp_path / "page.html", "error", style)
+    page = Page(browser, tmp_path / "page.html")
+    assert page.text("h1") == page.browser.title == "A <b>title</b>"
+    ticks = [t.text.strip("≤≥ ") for t in page.all("#ticks span")]
+    assert ticks == ["1e-4", "1e-3", "2.0e-02"]
+    lit = page.pictures(tmp_path / "lit.png")
+    page.press("s")
+    for bright, dark in zip(page.pictures(tmp_path / "plain.png"), lit, strict=True):
+        assert dark.sum() < bright.sum()
+        assert (dark <= bright + 1).mean() > 0.99
+    assert page.browser.get_log("browser") == []
+
+
+def test_a_large_page_is_thinned_and_says_so(monkeypatch, ellipsoid, tmp_path):
+    whole = viewing.html_page(ellipsoid)
+    monkeypatch.setattr(page_module, "LIMIT", len(whole.text) - 1)
+    with pytest.warns(UserWarning, match=r"386 vertices would take more than .* MB: without difference to"):
+        thinned = viewing.html_page(ellipsoid)
+    assert len(thinned.text) < len(whole.text)
+    monkeypatch.setattr(page_module, "LIMIT", 0)
+    with pytest.warns(UserWarning, match=r"without mean_curvature, .*, and it still takes 0 MB"):
+        least = viewing.html_page(ellipsoid, "error")
+    data = json.loads(least.text.split('id="data">')[1].split("</script>")[0])
+    assert [f["name"] for f in data["fields"]] == ["error"]
+
+
+def test_page_in_a_notebook(ellipsoid):
+    page = viewing.html_page(ellipsoid)
+    assert repr(page).startswith("Page(0.")
+    frame = page._repr_html_()
+    assert frame.startswith('<iframe srcdoc="&lt;!doctype html&gt;')
+    assert frame.count('"') == 10  # quotes of the page do not end its own

@@ -84,7 +84,7 @@ class PlotterComponent:
             "nan_color": NAN_COLOUR,
             "show_edges": True,
             "scalar_bar_args": bar,
-            **surface_style(shading=False),
+            **surface_style(),
         }
         if (shown.values[name] < shown.limits[0]).any():
             defaults["below_color"] = ZERO_COLOUR

@@ -159,3 +159,6 @@ FIELDS: dict[str, Callable[[Fields], Field]] = {
     "roughness": _small_quality("roughness", "relative error of extrapolation at the boundary, about"),
 }
 """Fields that a map of any comparison can show, by name."""
+
+OF_MESH = ("gaussian_curvature", "valence", "skew", "aspect", "nonplanarity", "roughness")
+"""Those that do not depend on the scheme."""

@@ -47,11 +47,10 @@ def colour_by(table: Any, field: Field) -> None:
     table.below_range_color = ZERO_COLOUR if field.shows_zero else None
 
 
-def surface_style(shading: bool) -> dict[str, Any]:
+def surface_style(shading: bool = False) -> dict[str, Any]:
     """Options of `Plotter.add_mesh` for a coloured surface: colours as they are, or lit."""
-    if shading:
-        return {"smooth_shading": True, "ambient": 0.25, "specular": 0.2, "edge_opacity": 0.25}
-    return {"lighting": False, "edge_opacity": 0.25}
+    light = {"ambient": 0.25, "specular": 0.2} if shading else {"lighting": False}
+    return {"edge_opacity": 0.25, **light}
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from quadcurv.comparison import Comparison, compare
 from quadcurv.viewing.opengl import NoOpenGLError, opengl_problem, window_problem
-from quadcurv.viewing.page import save_page
+from quadcurv.viewing.page import Page, make_page
 from quadcurv.viewing.style import Style
 from quadcurv.viewing.views import View
 from quadcurv.viewing.window import window
@@ -75,6 +75,33 @@ def maps(what: Any, field: str = "error", style: Style | None = None) -> pv.Plot
     return View(_comparison(what), field, style, off_screen=True).plotter
 
 
+def html_page(what: Any, field: str = "mean_curvature", style: Style | None = None) -> Page:
+    """Page in HTML with linked views, one a scheme, and every field to choose from.
+
+    It needs neither a network nor, where it is made, OpenGL; a notebook shows it in a frame.
+
+    Parameters
+    ----------
+    what, field, style
+        As for :func:`view`; but for the size of the style, which is the browser's.
+
+    Returns
+    -------
+    Page
+
+    Raises
+    ------
+    ValueError
+        Unknown field; limits of the style that do not fit its scale.
+
+    Warns
+    -----
+    UserWarning
+        It would take more than 20 MB: fields were left out, or it is larger nevertheless.
+    """
+    return make_page(_comparison(what), field, style)
+
+
 def save_maps(what: Any, path: str | Path, field: str = "error", style: Style | None = None) -> None:
     """Write maps to a file: one linked view a scheme, one colour bar for all.
 
@@ -95,7 +122,7 @@ def save_maps(what: Any, path: str | Path, field: str = "error", style: Style | 
     """
     path = Path(path)
     if path.suffix == ".html":
-        save_page(_comparison(what), path, field, style)
+        html_page(what, field, style).save(path)
     elif path.suffix == ".png":
         problem = opengl_problem()
         if problem:

@@ -220,18 +220,24 @@ class View:
         """Rows for the heading, if there is one, the views, the legend and, in a window, the controls."""
         import pyvista as pv
 
-        rows = max(1, round(sqrt(views / 2)))  # twice as wide as high
         self._heads = int(self.style.title is not None)
-        self._columns = ceil(views / rows)
-        around = HEADING * self._heads + LEGEND
-        width, height = PANEL * max(self._columns, 2), PANEL * rows
-        controls = CONTROLS * (not off_screen)
+        around, controls = HEADING * self._heads + LEGEND, CONTROLS * (not off_screen)
         if self.style.size is None:
+            rows = max(1, round(sqrt(views / 2)))  # twice as wide as high
+            width, height = PANEL * max(ceil(views / rows), 2), PANEL * rows
             scale = _SCALE if off_screen else min(1.0, SCREEN[0] / width, SCREEN[1] / height)
             size = [int(width * scale), int((height + around) * scale) + controls]
         else:
             size = [int(pixels) for pixels in self.style.size]
-            scale = min(size[0] / width, max(size[1] - controls, 50) / (height + around))
+            high = max(size[1] - controls, 50)
+
+            def scaled(rows: int) -> float:
+                wide = PANEL * max(ceil(views / rows), 2)
+                return min(size[0] / wide, high / (PANEL * rows + around))
+
+            rows = max(range(1, views + 1), key=scaled)
+            scale = scaled(rows)
+        self._columns = ceil(views / rows)
         panel = (size[1] - controls - around * scale) / rows
         heights = [HEADING * scale] * self._heads + [panel] * rows + [LEGEND * scale]
         heights += [controls] * (not off_screen)
@@ -265,6 +271,11 @@ class View:
         self._marks = Marks(self._fields, self._scene.scale)
         surface = polydata(points, faces)
         surface[VALUES] = np.zeros(self.comparison.valence.size)
+        if self.style.shading:  # smoothly
+            surface.compute_normals(
+                cell_normals=False, split_vertices=False, consistent_normals=False, inplace=True
+            )
+            surface.point_data.active_normals_name = "Normals"
         self._panels, self._surfaces, self._mappers, self._coarse = [], [], [], []
         if large := len(faces) > _LARGE and not self.plotter.off_screen:
             self.plotter.disable_anti_aliasing()
@@ -284,7 +295,9 @@ class View:
                 render=False,
                 **surface_style(self.style.shading),
             )
-            self._panels.append(actor.mapper.dataset)
+            if self.style.shading:
+                actor.prop.interpolation = "Phong"
+            self._panels.append(panel)
             if large:
                 self._coarse.append(coarse.copy(deep=False))
             self._surfaces.append(actor)
