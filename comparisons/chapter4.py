@@ -21,7 +21,7 @@ from comparisons.common import (
     print_claims,
     save_figure,
 )
-from quadcurv import surfaces
+from quadcurv import surfaces, viewing
 from quadcurv.comparison import compare
 from quadcurv.convergence import Convergence, convergence
 from quadcurv.schemes import SCHEMES, cotan
@@ -29,7 +29,6 @@ from quadcurv.schemes.cotan import cotan_matrices
 from quadcurv.schemes.finite_volume import FINITE_VOLUME
 from quadcurv.schemes.liu import LIU
 from quadcurv.stencils import Stencils
-from quadcurv.viewing import window
 
 Results = dict[str, float]
 
@@ -146,10 +145,10 @@ def error_maps(output: Path, console: Console, quick: bool) -> None:
     n = 16 if quick else 48
     mesh, xi, eta = surface.sample((2 * n, n), "staggered")
     comparison = compare(mesh, ALL, surface.mean_curvature(xi, eta))
-    window.save_maps(comparison, output / "pillow_error_maps.html", "error")
+    viewing.save_maps(comparison, output / "pillow_error_maps.html", "error")
     try:
-        window.save_maps(comparison, output / "pillow_error_maps.png", "error")
-    except window.NoOpenGLError as missing:
+        viewing.save_maps(comparison, output / "pillow_error_maps.png", "error")
+    except viewing.NoOpenGLError as missing:
         console.print(f"No picture of the maps, only the page pillow_error_maps.html: {missing}")
 
 

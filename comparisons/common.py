@@ -1,7 +1,6 @@
 """What the comparison scripts share: figures, tables, claims and the command line."""
 
 import argparse
-import csv
 from collections.abc import Mapping, Sequence
 from dataclasses import astuple, dataclass, fields
 from pathlib import Path
@@ -10,24 +9,20 @@ from typing import Any, Literal
 import matplotlib as mpl
 import numpy as np
 from cycler import cycler
-from matplotlib.axes import Axes
-from matplotlib.cm import ScalarMappable
-from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from rich.console import Console
 from rich.table import Table
 
+from quadcurv import tables, viewing
 from quadcurv.comparison import Comparison
-from quadcurv.convergence import fitted_rate
 from quadcurv.curvature import dual_areas
-from quadcurv.mesh import Mesh, QuadGrid, StaggeredGrid
-from quadcurv.viewing import window
+from quadcurv.mesh import Mesh
+from quadcurv.viewing.figures import COLOURS
+from quadcurv.viewing.figures import MARKERS as MARKERS
+from quadcurv.viewing.figures import convergence_plot as convergence_plot
 
-# Okabe and Ito (2008): told apart with every kind of colour blindness.
-COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
 MAP = "viridis"
-MARKERS = ("o", "s", "^", "D", "v", "P", "X")
 OUTPUT = Path(__file__).parent / "output"
 
 paper_style = mpl.rc_context(
@@ -121,83 +116,7 @@ def save_figure(fig: Figure, output: Path, stem: str, columns: Mapping[str, Arra
 def write_csv(output: Path, stem: str, columns: Mapping[str, ArrayLike]) -> None:
     """Write columns of one length to output/stem.csv, in full precision."""
     output.mkdir(parents=True, exist_ok=True)
-    values = [np.asarray(column).tolist() for column in columns.values()]
-    with open(output / f"{stem}.csv", "w", newline="") as file:
-        writer = csv.writer(file)
-        writer.writerow(columns)
-        writer.writerows(zip(*values, strict=True))
-
-
-def convergence_plot(
-    axes: Axes,
-    sizes: ArrayLike,
-    series: Mapping[str, ArrayLike],
-    fit: Mapping[str, tuple[float, float]],
-    slopes: Sequence[float] = (),
-    rounding: tuple[ArrayLike, str] | None = None,
-) -> dict[str, float]:
-    """Errors against size on logarithmic axes with best-fit lines, as the thesis draws them.
-
-    Parameters
-    ----------
-    axes : matplotlib axes
-        Drawn into; the caller labels them.
-    sizes : array_like, shape (m,)
-        Number of points or cells in one direction.
-    series : mapping from label to array_like, shape (m,)
-        Errors. Zeros lie on the lower edge of the plot with an open marker; NaN is left out.
-    fit : mapping from label to (first, last) size
-        The sizes to fit, between two vertical dashed lines; a label not in it has no line.
-    slopes : sequence of float
-        Orders to show by grey reference lines above the last errors.
-    rounding : (array_like of shape (m,), label), optional
-        What rounding alone is expected to give, shown dotted.
-
-    Returns
-    -------
-    dict
-        Fitted rate by label, for the labels in `fit`; NaN, and no line, where an error is zero.
-    """
-    n = np.asarray(sizes, dtype=float)
-    errors = {label: np.asarray(e, dtype=float) for label, e in series.items()}
-    positive = np.concatenate([e[np.isfinite(e) & (e > 0)] for e in errors.values()])
-    floor = positive.min() / 10 if positive.size else np.finfo(float).eps
-    axes.set_xscale("log", base=2)
-    axes.set_yscale("log")
-    axes.minorticks_off()
-    rates = {}
-    for i, (label, e) in enumerate(errors.items()):
-        style: dict[str, Any] = {"color": COLOURS[i % len(COLOURS)], "marker": MARKERS[i % len(MARKERS)]}
-        text = label
-        if label in fit:
-            first, last = fit[label]
-            inside = (n >= first) & (n <= last)
-            rates[label] = rate = fitted_rate(n[inside], e[inside])
-            if np.isfinite(rate):
-                text = f"{label}: rate {rate:.2f}"
-                factor = np.exp(np.log(e[inside] * n[inside] ** rate).mean())
-                axes.plot(n[inside], factor * n[inside] ** -rate, color=style["color"])
-        zero = e == 0
-        axes.plot(n, np.where(zero, np.nan, e), linestyle="none", label=text, **style)
-        if zero.any():
-            axes.plot(n[zero], np.full(zero.sum(), floor), linestyle="none", fillstyle="none", **style)
-            axes.set_ylim(bottom=floor)
-    for k, edge in enumerate(sorted({size for span in fit.values() for size in span})):
-        axes.axvline(
-            edge, color="0.4", linestyle="--", linewidth=0.9, label=None if k else "range of the fit"
-        )
-    top = max((e[-1] for e in errors.values() if e[-1] > 0), default=floor)
-    for slope in slopes:
-        tail = n[len(n) // 2 :]
-        guide = 4 * top * (tail / n[-1]) ** -slope
-        axes.plot(tail, guide, color="0.6", linewidth=0.9)
-        middle = len(tail) // 2
-        axes.text(tail[middle], guide[middle], f" order {slope:g}", color="0.4", va="bottom")
-    if rounding is not None:
-        level, label = rounding
-        axes.plot(n, level, color="0.3", linestyle=":", label=f"rounding, {label}")
-    axes.legend()
-    return rates
+    tables.write_csv(output / f"{stem}.csv", columns)
 
 
 def below(value: float, power: int) -> str:
@@ -248,27 +167,12 @@ def save_maps(
     ]
     header = ("panel", "x", "y", "z", "value")
     write_csv(output, stem, dict(zip(header, zip(*table, strict=True), strict=True)))
-    problem = window.opengl_problem()
+    problem = viewing.opengl_problem()
     if problem:
         for i, (title, (mesh, values)) in enumerate(panels.items(), 1):
-            window.save_maps(_as_error(mesh, title, values), output / f"{stem}_{i}.html")
+            viewing.save_maps(_as_error(mesh, title, values), output / f"{stem}_{i}.html")
         return problem
-    images = {title: _picture(*panel, decades, camera) for title, panel in panels.items()}
-    widths = [image.shape[1] / image.shape[0] for image in images.values()]
-    width = 0.9 * height * sum(widths) + 0.3 * len(images) + (0.9 if decades else 0)
-    fig, axes = figure(1, len(images), (width, height), width_ratios=widths, squeeze=False)
-    for ax, (title, image) in zip(axes.flat, images.items(), strict=True):
-        ax.imshow(image, interpolation="antialiased")
-        ax.set_title(title)
-        ax.axis("off")
-    if decades is not None:
-        low, high = (10.0**power for power in decades)
-        known = np.array([row[-1] for row in table])
-        ends = {(True, True): "both", (True, False): "min", (False, True): "max"}
-        extend = ends.get((bool((known < low).any()), bool((known > high).any())), "neither")
-        scale = ScalarMappable(LogNorm(low, high), MAP)
-        fig.colorbar(scale, ax=axes, label=label, extend=extend, shrink=0.8, aspect=25, pad=0.03)
-    save_figure(fig, output, stem)
+    save_figure(viewing.surfaces_figure(panels, label, decades, camera, height), output, stem)
     return None
 
 
@@ -278,42 +182,6 @@ def _as_error(mesh: Mesh, title: str, values: ArrayLike) -> Comparison:
     e = np.reshape(values, stencils.shape)
     valence = stencils.valence.reshape(stencils.shape)
     return Comparison(mesh, {title: e}, np.zeros(stencils.shape), dual_areas(mesh, "liu"), valence)
-
-
-def _picture(
-    mesh: Mesh, given: ArrayLike, decades: tuple[int, int] | None, camera: tuple[float, ...]
-) -> NDArray[np.uint8]:
-    """Painted surface, without the empty margin; edges are drawn where they can be told apart."""
-    import pyvista as pv
-
-    corners = QuadGrid(mesh.dual) if isinstance(mesh, StaggeredGrid) else mesh
-    stencils = corners.stencils()
-    surface = pv.PolyData.from_regular_faces(np.array(stencils.points), stencils.faces.astype(int))
-    values = np.ravel(given)
-    mapper: dict[str, Any] = {"smooth_shading": True, "specular": 0.2, "ambient": 0.25}
-    if decades is not None:
-        values = np.log10(np.maximum(values, 10.0 ** decades[0]))
-        mapper = {"lighting": False, "clim": decades}
-    (surface.cell_data if isinstance(mesh, StaggeredGrid) else surface.point_data)["value"] = values
-    with pv.vtk_verbosity("off"):  # it would warn of every way to draw that it tries in vain
-        plotter: Any = pv.Plotter(off_screen=True, window_size=[1200, 1200])
-        plotter.enable_parallel_projection()
-        plotter.enable_anti_aliasing("msaa")
-        plotter.add_mesh(
-            surface,
-            scalars="value",
-            cmap=MAP,
-            show_edges=surface.n_cells <= 20_000,
-            edge_opacity=0.25,
-            nan_color="#d0d0d0",
-            show_scalar_bar=False,
-            **mapper,
-        )
-        plotter.view_vector(camera, viewup=(0, 0, 1))
-        image = np.asarray(plotter.screenshot(transparent_background=True, return_img=True))
-        plotter.close()
-    rows, columns = (np.flatnonzero(image[..., 3].any(axis=axis)) for axis in (1, 0))
-    return image[rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1]
 
 
 def arguments(description: str | None) -> argparse.Namespace:

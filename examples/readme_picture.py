@@ -6,7 +6,7 @@ from PIL import Image
 
 from quadcurv import surfaces
 from quadcurv.comparison import Comparison, compare
-from quadcurv.viewing.window import save_maps
+from quadcurv.viewing import save_maps
 
 
 def pillow(cells: int = 40) -> Comparison:

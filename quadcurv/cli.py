@@ -2,25 +2,26 @@
 
 from __future__ import annotations
 
-import csv
 import json
 import subprocess
 import sys
 import warnings
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Annotated, Any
 
 import numpy as np
 from cyclopts import App, CycloptsError, Parameter
-from numpy.typing import ArrayLike
 from rich.console import Console
 
 import quadcurv
+from quadcurv.boundary import boundary_treatment
 from quadcurv.comparison import Comparison
-from quadcurv.io import write
+from quadcurv.curvature import mean_curvature, vertex_normals
+from quadcurv.io import read, write
 from quadcurv.mesh import Mesh
-from quadcurv.schemes import SCHEMES
+from quadcurv.schemes import SCHEMES, as_scheme
+from quadcurv.tables import write_csv
 from quadcurv.viewing.fields import FIELDS
 
 _COMPARISONS = Path(__file__).resolve().parents[1] / "comparisons"
@@ -118,16 +119,19 @@ def curvature(
     """
     from quadcurv.quality import quality
 
-    found = quadcurv.read(mesh)
-    H = quadcurv.mean_curvature(found, scheme)
+    found = read(mesh)
+    H = mean_curvature(found, as_scheme(scheme))
     data: dict[str, Any] = {
         "mean_curvature": H,
-        "Normals": quadcurv.vertex_normals(found),
-        "boundary": quadcurv.boundary_treatment(found),
+        "Normals": vertex_normals(found),
+        "boundary": boundary_treatment(found),
         **quality(found),
     }
     if output.suffix.lower() == ".csv":
-        _write_csv(output, found, data)
+        stencils = found.stencils()
+        columns = {"": stencils.points[: stencils.n], **data}
+        inner = {name: np.shape(values)[len(stencils.shape) :] for name, values in data.items()} | {"": (3,)}
+        write_csv(output, {name: np.reshape(v, (stencils.n, *inner[name])) for name, v in columns.items()})
     else:
         write(output, found, data)
     print(_counts(found))
@@ -165,7 +169,7 @@ def view(
     png
         Write a picture of the same views.
     """
-    from quadcurv.viewing import window as viewing
+    from quadcurv import viewing
 
     refined = _refinements(mesh, scheme)
     comparison = refined(viewing.View.START) if refined else _comparison(mesh, scheme)
@@ -177,7 +181,7 @@ def view(
         problem = viewing.window_problem()
         if problem:
             raise viewing.NoOpenGLError(f"{problem}; --html FILE writes a page instead")
-        viewing.view(comparison, field, refined)
+        viewing.view(comparison, field, refined=refined)
 
 
 @app.command
@@ -228,7 +232,7 @@ def reproduce(
 
 def main(arguments: Iterable[str] | None = None) -> None:
     """Run the command line; what is wrong with the input takes one line and exit code 2."""
-    from quadcurv.viewing.window import NoOpenGLError
+    from quadcurv.viewing import NoOpenGLError
 
     with warnings.catch_warnings():
         warnings.simplefilter("default", UserWarning)
@@ -269,7 +273,7 @@ def _counts(mesh: Mesh) -> str:
 def _comparison(mesh: str | Path, scheme: list[str] | None) -> Comparison:
     from quadcurv.comparison import compare
 
-    return compare(quadcurv.read(mesh), scheme)
+    return compare(read(mesh), scheme)
 
 
 def _refinements(name: str, scheme: list[str] | None) -> Callable[[int], Comparison] | None:
@@ -295,23 +299,8 @@ def _refinements(name: str, scheme: list[str] | None) -> Callable[[int], Compari
     return refined
 
 
-def _write_csv(path: Path, mesh: Mesh, data: Mapping[str, ArrayLike]) -> None:
-    """Positions and values by vertex; vectors as three columns."""
-    stencils = mesh.stencils()
-    columns: dict[str, Any] = {}
-    for name, values in {"": stencils.points[: stencils.n], **data}.items():
-        flat = np.reshape(values, (stencils.n, -1))
-        suffixes = [""] if flat.shape[1] == 1 else ["x", "y", "z"]
-        join = "_" if name else ""
-        columns |= {name + join * bool(axis) + axis: v for axis, v in zip(suffixes, flat.T, strict=True)}
-    with path.open("w", newline="") as file:
-        rows = csv.writer(file)
-        rows.writerow(columns)
-        rows.writerows(zip(*(column.tolist() for column in columns.values()), strict=True))
-
-
 def _save_pictures(comparison: Comparison, folder: Path, stem: str) -> None:
-    from quadcurv.viewing.window import opengl_problem, save_maps
+    from quadcurv.viewing import opengl_problem, save_maps
 
     folder.mkdir(parents=True, exist_ok=True)
     problem = opengl_problem()

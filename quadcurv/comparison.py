@@ -1,28 +1,31 @@
-"""Operators side by side: errors, differences, norms, rates and their tables."""
+"""Operators side by side: errors, differences, norms and their tables."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import combinations
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 from rich.console import Console
 from rich.table import Table
+from rich.text import Text
 
-from quadcurv.curvature import dual_areas, mean_curvature
+from quadcurv import drivers
+from quadcurv.boundary import checked_boundary, one_rings
+from quadcurv.curvature import dual_areas
+from quadcurv.drivers import direct
 from quadcurv.io import as_mesh
 from quadcurv.mesh import Mesh
-from quadcurv.schemes import SCHEMES, Scheme, as_scheme
-from quadcurv.tables import finite, progress, short, text_table, write_csv
-from quadcurv.types import Floats, Ints
-
-if TYPE_CHECKING:
-    import pyvista as pv
+from quadcurv.precision import warn_of_rounding
+from quadcurv.schemes import SCHEMES, Fit, Scheme, as_scheme
+from quadcurv.stencils import Stencils
+from quadcurv.tables import by_column, finite, progress, short, text_tables, write_csv
+from quadcurv.types import Bools, Floats, Ints
 
 NORMS = ("one", "two", "inf", "one-area", "two-area")
 
@@ -33,28 +36,35 @@ def norms(errors: ArrayLike, areas: ArrayLike) -> dict[str, float]:
     Parameters
     ----------
     errors, areas : array_like of one shape
+        An area that is not finite has no weight.
 
     Returns
     -------
     dict
-        "one": mean |e|, "two": root mean e^2, "inf": max |e|, "one-area": sum A |e| / sum A, "two-area":
-        (sum A e^2 / sum A)^(1/2). All NaN where no error is finite.
+        "vertices": number of finite errors, "one": mean |e|, "two": root mean e^2, "inf": max |e|,
+        "one-area": sum A |e| / sum A, "two-area": (sum A e^2 / sum A)^(1/2). NaN where no error is finite,
+        and by area where those of the finite ones add up to nothing.
     """
     e, A = np.abs(np.ravel(errors)), np.ravel(areas)
     known = np.isfinite(e)
-    if not known.any():
-        return dict.fromkeys(NORMS, np.nan)
-    e, A = e[known], A[known]
+    e, A = e[known], np.where(np.isfinite(A[known]), A[known], 0.0)
+    if e.size == 0:
+        return {"vertices": 0, **dict.fromkeys(NORMS, np.nan)}
+    # In units of the largest, so that neither squares nor areas leave the range of doubles.
+    largest, most = e.max() or 1.0, A.max()
+    unit, A = e / largest, A / (most or 1.0)
+    total = A.sum() if most > 0 else np.nan
     return {
-        "one": float(e.mean()),
-        "two": float(np.sqrt(np.mean(e**2))),
+        "vertices": e.size,
+        "one": float(unit.mean() * largest),
+        "two": float(np.sqrt(np.mean(unit**2)) * largest),
         "inf": float(e.max()),
-        "one-area": float(np.average(e, weights=A)),
-        "two-area": float(np.sqrt(np.average(e**2, weights=A))),
+        "one-area": float(A @ unit / total * largest),
+        "two-area": float(np.sqrt(A @ unit**2 / total) * largest),
     }
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Comparison:
     """Mean curvature of one mesh by several schemes, as made by :func:`compare`.
 
@@ -62,12 +72,17 @@ class Comparison:
     ----------
     mesh : QuadMesh, QuadGrid or StaggeredGrid
     mean_curvature : dict of str to float64 array of shape (n,) or (r, c)
-        By scheme, in 1 / length.
+        By scheme, in 1 / length; NaN where a scheme has no answer.
     exact : float64 array of that shape, or None
     areas : float64 array of that shape
         Liu's dual areas, the weights of the area-weighted norms.
     valence : (n,) or (r, c) int32
         Faces at each vertex.
+    families : dict of str to str
+        What each scheme stems from: schemes of one family have one vote in the :attr:`consensus`. A scheme
+        that is not named is its own.
+    notes : dict of str to str
+        By scheme, why it has no answer anywhere.
     """
 
     mesh: Mesh
@@ -75,6 +90,12 @@ class Comparison:
     exact: Floats | None
     areas: Floats
     valence: Ints
+    families: Mapping[str, str] = field(default_factory=dict)
+    notes: Mapping[str, str] = field(default_factory=dict)
+
+    def __repr__(self) -> str:
+        schemes = f"{len(self.schemes)} schemes" if len(self.schemes) > 1 else self.schemes[0]
+        return f"Comparison({self.mesh!r}, {schemes} against {self.reference})"
 
     @property
     def schemes(self) -> tuple[str, ...]:
@@ -90,20 +111,37 @@ class Comparison:
 
     @cached_property
     def errors(self) -> dict[str, Floats]:
-        """H minus the :attr:`reference` by scheme."""
+        """H minus the :attr:`reference` by scheme; NaN where either is."""
         reference = self.consensus if self.exact is None else self.exact
         return {name: H - reference for name, H in self.mean_curvature.items()}
 
     @cached_property
     def consensus(self) -> Floats:
-        """Median of all schemes at each vertex, NaN where any of them is; of two schemes the first."""
-        H = list(self.mean_curvature.values())
-        return np.median(H, axis=0) if len(H) > 2 else H[0]
+        """Median at each vertex of the schemes that have an answer there; of two schemes the first.
+
+        Every family of schemes has one vote, shared by those of it that have an answer. NaN where none has.
+        """
+        if len(self.schemes) < 3:
+            return self.mean_curvature[self.schemes[0]]
+        H = np.array([values.ravel() for values in self.mean_curvature.values()])
+        return _median(H, self._votes(np.isfinite(H))).reshape(self.valence.shape)
+
+    def _votes(self, known: Bools) -> Floats:
+        """(schemes, n) parts of a vote, 0 where a scheme has no answer."""
+        family = [self.families.get(name, name) for name in self.schemes]
+        votes = known.astype(float)
+        for name in set(family):
+            members = [i for i, other in enumerate(family) if other == name]
+            votes[members] /= np.maximum(votes[members].sum(axis=0), 1)
+        return votes
 
     @cached_property
     def spread(self) -> Floats:
-        """Largest minus smallest H of all schemes at each vertex; NaN where any of them is."""
-        return np.ptp(list(self.mean_curvature.values()), axis=0)
+        """Largest minus smallest H of the schemes that have one; NaN where fewer than two have."""
+        H = np.array(list(self.mean_curvature.values()))
+        known = np.isfinite(H)
+        gap = np.max(H, axis=0, where=known, initial=-np.inf) - np.min(H, axis=0, where=known, initial=np.inf)
+        return np.where(known.sum(axis=0) > 1, gap, np.nan)
 
     def norms(self) -> dict[str, dict[str, float]]:
         """Norms of :attr:`errors` by scheme, see :func:`norms`."""
@@ -120,7 +158,7 @@ class Comparison:
         }
 
     def differences(self) -> dict[tuple[str, str], dict[str, float]]:
-        """Norms of the difference in H between every two schemes."""
+        """Norms of the difference in H between every two schemes, where both have one."""
         H = self.mean_curvature
         return {(a, b): norms(H[a] - H[b], self.areas) for a, b in combinations(H, 2)}
 
@@ -131,6 +169,7 @@ class Comparison:
             "valence": {str(v): int(np.sum(self.valence == v)) for v in np.unique(self.valence)},
             "reference": self.reference,
             "undefined": {k: int(np.count_nonzero(np.isnan(H))) for k, H in self.mean_curvature.items()},
+            "notes": dict(self.notes),
             "errors": self.norms(),
             "errors_by_valence": {str(v): e for v, e in self.by_valence().items()},
             "differences": {f"{a} - {b}": d for (a, b), d in self.differences().items()},
@@ -138,72 +177,68 @@ class Comparison:
         return finite(summary)
 
     def to_csv(self, path: str | Path) -> None:
-        """Write one row a scheme and valence ("all" included): count and norms of the errors."""
+        """Write one row a scheme and valence ("all" included): norms of the errors over how many vertices."""
         groups = {"all": self.norms(), **{str(v): e for v, e in self.by_valence().items()}}
         rows = [
-            {"scheme": name, "valence": group, "vertices": self._count(group), **values}
+            {"scheme": name, "valence": group, **values}
             for group, by_scheme in groups.items()
             for name, values in by_scheme.items()
         ]
-        write_csv(path, rows)
-
-    def _count(self, group: str) -> int:
-        return self.valence.size if group == "all" else int(np.sum(self.valence == int(group)))
+        write_csv(path, by_column(rows))
 
     def tables(self) -> list[Table]:
         """Rich tables, 80 columns at most: curvature and norms by scheme, by valence, by pair."""
-        against = self.reference
-        main = text_table(
-            f"Mean curvature H (1/length) and |H - {against}|",
-            ["scheme", "min H", "max H", "undefined", "mean", "by area", "rms", "max"],
-        )
-        for name, H in self.mean_curvature.items():
-            e = norms(self.errors[name], self.areas)
+        tables = [*self._main_table(), *self._valence_tables()]
+        return tables if self.exact is not None else tables + self._pair_tables()
+
+    def _main_table(self) -> list[Table]:
+        title = f"Mean curvature H (1/length) and |H - {self.reference}|, over how many vertices"
+        header = ["scheme", "min H", "max H", "vertices", "mean", "by area", "rms", "max"]
+        rows = []
+        for name, e in self.norms().items():
+            H = self.mean_curvature[name]
             known = H[np.isfinite(H)]
             low, high = (known.min(), known.max()) if known.size else (np.nan, np.nan)
-            main.add_row(
-                name,
-                f"{low:.4g}",
-                f"{high:.4g}",
-                str(H.size - known.size),
-                *(short(e[k]) for k in ("one", "one-area", "two", "inf")),
-            )
+            ends = f"{low:.4g}", f"{high:.4g}", str(e["vertices"])
+            rows.append([name, *ends, *(short(e[k]) for k in ("one", "one-area", "two", "inf"))])
+        return text_tables(title, header, rows)
+
+    def _valence_tables(self) -> list[Table]:
         groups = self.by_valence()
-        valence = text_table(
-            f"Mean |H - {against}| by valence",
-            ["scheme", *(f"{v} ({self._count(str(v))})" for v in groups)],
-        )
-        for name in self.schemes:
-            valence.add_row(name, *(short(e[name]["one"]) for e in groups.values()))
-        if self.exact is not None:
-            return [main, valence]
+        sizes = {v: int(np.sum(self.valence == v)) for v in groups}
+        header = ["scheme", *(f"{v} ({size})" for v, size in sizes.items())]
+
+        def cell(v: int, name: str) -> str:
+            e = groups[v][name]
+            return short(e["one"]) + (f" ({e['vertices']})" if 0 < e["vertices"] < sizes[v] else "")
+
+        rows = [[name, *(cell(v, name) for v in groups)] for name in self.schemes]
+        return text_tables(f"Mean |H - {self.reference}| by valence (of vertices)", header, rows)
+
+    def _pair_tables(self) -> list[Table]:
         number = {name: str(i + 1) for i, name in enumerate(self.schemes)}
         mean = {pair: short(d["one"]) for pair, d in self.differences().items()}
-        tables = [main, valence]
-        for start in range(0, len(number), 8):  # more columns do not fit
-            columns = self.schemes[start : start + 8]
-            pairs = text_table(
-                "Mean difference |H - H'| between schemes", ["", *(number[b] for b in columns)]
-            )
-            for a in self.schemes:
-                pairs.add_row(f"{number[a]} {a}", *(mean.get((a, b), mean.get((b, a), "-")) for b in columns))
-            tables.append(pairs)
-        return tables
+        rows = [
+            [f"{number[a]} {a}", *(mean.get((a, b), mean.get((b, a), "-")) for b in self.schemes)]
+            for a in self.schemes
+        ]
+        return text_tables("Mean difference |H - H'| between schemes", ["", *number.values()], rows)
 
-    def __rich_console__(self, console: Console, options: Any) -> Iterator[Table]:
+    def __rich_console__(self, console: Console, options: Any) -> Iterator[Table | Text]:
         yield from self.tables()
+        for name, reason in self.notes.items():
+            yield Text(f"{name}: {reason}")
 
-    def plot(self, field: str = "error") -> pv.Plotter:
-        """Maps of a field, one view a scheme: see :func:`quadcurv.viewing.window.maps`."""
-        from quadcurv.viewing.window import maps
 
-        return maps(self, field)
-
-    def view(self, field: str = "mean_curvature") -> None:
-        """Open a window with linked views, one a scheme, see :class:`quadcurv.viewing.window.View`."""
-        from quadcurv.viewing.window import view
-
-        view(self, field)
+def _median(values: Floats, weights: Floats) -> Floats:
+    """Weighted median along the first axis, the mean of two where they share the middle; NaN weighs 0."""
+    order = np.argsort(values, axis=0)  # NaN last
+    values, weights = (np.take_along_axis(x, order, axis=0) for x in (values, weights))
+    below = np.cumsum(weights, axis=0)
+    half, slack = below[-1] / 2, 1e-9  # for what thirds of votes leave
+    ends = [np.argmax(below >= half - slack, axis=0), np.argmax(below > half + slack, axis=0)]
+    low, high = (np.take_along_axis(values, end[None], axis=0)[0] for end in ends)
+    return np.where(half > 0, (low + high) / 2, np.nan)
 
 
 def compare(
@@ -222,43 +257,86 @@ def compare(
         By default all of ``quadcurv.SCHEMES``.
     exact : array_like or callable, optional
         Exact mean curvature in 1 / length: a number, an array of the shape of the result, or a function
-        of the points. Without it schemes are compared with their median,
-        two with the first.
+        of the points. Without it schemes are compared with their median, two with the first.
     boundary : {"extrapolate", "nan"}
         See :func:`quadcurv.one_rings`.
 
     Returns
     -------
     Comparison
+        A scheme that cannot be evaluated is NaN everywhere; ``notes`` says why.
 
     Raises
     ------
+    MeshError
+        A ValueError: the mesh is not one.
     ValueError
-        As :func:`quadcurv.mean_curvature`; no or repeated schemes; exact does not fit.
+        Unknown scheme or boundary; no or repeated schemes; exact does not fit.
     """
     mesh = as_mesh(mesh)
     chosen = schemes_of(SCHEMES if schemes is None else schemes)
-    names = [s.name for s in chosen]
+    evaluation = Evaluation(mesh, boundary)
+    given = evaluation.given
+    if callable(exact):
+        exact = exact(mesh.in_shape(given.points[: given.n]))
+    valence = mesh.in_shape(given.valence)
+    if exact is not None:
+        exact = _fitting(exact, valence.shape)
+    H, notes = {}, {}
+    for scheme in progress(chosen, "schemes", weight=given.n * len(chosen)):
+        try:
+            H[scheme.name] = evaluation.mean_curvature(scheme)
+        except Exception as error:  # of one scheme, which says nothing of the others
+            H[scheme.name] = np.full(valence.shape, np.nan)
+            notes[scheme.name] = f"{type(error).__name__}: {error}"
+    families = {scheme.name: scheme.reference or scheme.name for scheme in chosen}
+    found = Comparison(mesh, H, exact, dual_areas(mesh, "liu"), valence, families, notes)
+    warn_of_rounding(mesh, found.consensus)
+    return found
+
+
+class Evaluation:
+    """A mesh and what schemes share on it: its stencils, made once."""
+
+    def __init__(self, mesh: Mesh, boundary: str) -> None:
+        self.mesh = mesh
+        self.boundary = checked_boundary(boundary)
+        self.given = mesh.stencils()
+
+    @cached_property
+    def closed(self) -> Stencils:
+        """Stencils with their boundary closed."""
+        return one_rings(self.mesh, self.boundary)
+
+    def mean_curvature(self, scheme: Scheme) -> Floats:
+        """H in the shape of results."""
+        if isinstance(scheme, Fit):
+            return drivers.fit(self.mesh, scheme, self.boundary).mean
+        if scheme.fast is not None:
+            return drivers.run(self.mesh, scheme, ["mean_curvature"], self.boundary)["mean_curvature"]
+        H = np.empty(self.given.shape)
+        direct.evaluate(self.given, self.closed, scheme, {"mean_curvature": H})
+        return self.mesh.in_shape(H.ravel())
+
+
+def _fitting(exact: ArrayLike, shape: tuple[int, ...]) -> Floats:
+    try:
+        return np.broadcast_to(np.asarray(exact, np.float64), shape)
+    except (TypeError, ValueError):
+        raise ValueError(
+            f"exact: expected numbers that fit the result's {shape}, got shape {np.shape(exact)}"
+        ) from None
+
+
+def schemes_of(schemes: str | Scheme | Iterable[str | Scheme]) -> Sequence[Scheme]:
+    """Schemes by name or themselves, one or several, each once."""
+    if isinstance(schemes, str | Scheme):
+        return [as_scheme(schemes)]
+    try:
+        chosen = [as_scheme(scheme) for scheme in schemes]
+    except TypeError:
+        raise TypeError(f"schemes: expected names or schemes, got {schemes!r}") from None
+    names = [scheme.name for scheme in chosen]
     if not names or len(set(names)) < len(names):
         raise ValueError(f"schemes: expected at least one, each once, got {names}")
-    stencils = mesh.stencils()
-    H = {
-        s.name: mean_curvature(mesh, s, boundary)
-        for s in progress(chosen, "schemes", weight=stencils.n * len(chosen))
-    }
-    areas = dual_areas(mesh, "liu")
-    if callable(exact):
-        exact = exact(mesh.in_shape(stencils.points[: stencils.n]))
-    if exact is not None:
-        try:
-            exact = np.broadcast_to(np.asarray(exact, np.float64), areas.shape)
-        except ValueError:
-            raise ValueError(
-                f"exact: shape {np.shape(exact)} does not fit the result's {areas.shape}"
-            ) from None
-    return Comparison(mesh, H, exact, areas, mesh.in_shape(stencils.valence))
-
-
-def schemes_of(schemes: str | Scheme | Iterable[str | Scheme]) -> list[Scheme]:
-    """Schemes by name, one or several."""
-    return [as_scheme(s) for s in ([schemes] if isinstance(schemes, str | Scheme) else schemes)]
+    return chosen

@@ -2,25 +2,27 @@
 
 from __future__ import annotations
 
+import operator
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any, Literal, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from rich.console import Console
 from rich.table import Table
 
-from quadcurv.comparison import NORMS, compare, schemes_of
+from quadcurv.comparison import NORMS, Evaluation, norms, schemes_of
+from quadcurv.curvature import dual_areas, gaussian_curvature, principal_curvatures
 from quadcurv.schemes import Scheme
-from quadcurv.surfaces import Surface
-from quadcurv.tables import finite, progress, short, text_table, write_csv
+from quadcurv.surfaces import SURFACES, Surface
+from quadcurv.tables import by_column, finite, progress, short, text_table, write_csv
 from quadcurv.types import Floats, Ints
 
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+Quantity = Literal["mean_curvature", "gaussian_curvature", "k1", "k2"]
 
+_SYMBOLS = {"mean_curvature": "H", "gaussian_curvature": "K", "k1": "k1", "k2": "k2"}
 _ROUNDING = 1e-9
 
 
@@ -87,26 +89,34 @@ def _logarithms(sizes: ArrayLike, errors: ArrayLike) -> tuple[NDArray[np.float64
     return np.log(x), np.log(y)
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Convergence:
     """Errors of several schemes on refinements of a surface, as made by :func:`convergence`.
 
     Attributes
     ----------
     surface, layout : str
+    quantity : {"mean_curvature", "gaussian_curvature", "k1", "k2"}
+        What the errors are of, in 1 / length, or of "gaussian_curvature" in 1 / length^2.
     shapes : tuple of (int, int)
         Cells in the two directions.
     errors : dict of str to dict of str to float64 array
         ``errors[scheme][norm]``, one number a shape; norms as in :func:`norms`.
     undefined : dict of str to int array
-        Number of vertices without a result, one number a shape.
+        Number of vertices without a result, one number a shape; they are left out of the norms.
     """
 
     surface: str
     layout: str
+    quantity: Quantity
     shapes: tuple[tuple[int, int], ...]
     errors: Mapping[str, Mapping[str, Floats]]
     undefined: Mapping[str, Ints]
+
+    def __repr__(self) -> str:
+        sizes = ", ".join(f"{r}x{c}" for r, c in self.shapes)
+        schemes = ", ".join(self.schemes)
+        return f"Convergence({self.symbol} on {self.surface}, {self.layout}, {sizes}, by {schemes})"
 
     @property
     def schemes(self) -> tuple[str, ...]:
@@ -114,22 +124,55 @@ class Convergence:
         return tuple(self.errors)
 
     @property
+    def symbol(self) -> str:
+        """Of the quantity: H, K, k1 or k2."""
+        return _SYMBOLS[self.quantity]
+
+    @property
     def sizes(self) -> Floats:
         """Refinement: geometric mean of the numbers of cells in the two directions."""
-        return np.sqrt(np.prod(self.shapes, axis=1, dtype=float))
+        return _sizes(self.shapes)
+
+    def norm(self, scheme: str, norm: str = "one") -> Floats:
+        """Errors of a scheme in a norm, one number a shape.
+
+        Raises
+        ------
+        ValueError
+            Not one of :attr:`schemes`, or not one of :data:`quadcurv.comparison.NORMS`.
+        """
+        for name, given, known in (("scheme", scheme, self.schemes), ("norm", norm, NORMS)):
+            if given not in known:
+                raise ValueError(f"{name}: expected one of {', '.join(known)}, got {given!r}")
+        return self.errors[scheme][norm]
 
     def rates(self, scheme: str, norm: str = "one") -> Floats:
-        """Rate between successive refinements, positive where errors fall; NaN beside a zero error."""
-        return successive_rates(self.sizes, self.errors[scheme][norm])
+        """Rate between successive refinements, positive where errors fall; NaN beside a zero error.
+
+        Raises
+        ------
+        ValueError
+            As :meth:`norm`.
+        """
+        return successive_rates(self.sizes, self.norm(scheme, norm))
 
     def fitted_rate(self, scheme: str, norm: str = "one", last: int | None = None) -> float:
-        """Rate by least squares over all, or the `last`, refinements (the thesis's best-fit line)."""
-        start = 0 if last is None else -last
-        return fitted_rate(self.sizes[start:], self.errors[scheme][norm][start:])
+        """Rate by least squares over all, or the `last`, refinements (the thesis's best-fit line).
+
+        Raises
+        ------
+        ValueError
+            As :meth:`norm`; `last` is not between 2 and the number of refinements.
+        """
+        errors, n = self.norm(scheme, norm), len(self.shapes)
+        last = n if last is None else last
+        if last not in range(2, n + 1):
+            raise ValueError(f"last: expected a whole number from 2 to {n}, got {last!r}")
+        return fitted_rate(self.sizes[n - last :], errors[n - last :])
 
     def rate_label(self, scheme: str, norm: str = "one") -> str:
         """Fitted rate to two digits, "exact" where all errors are rounding."""
-        exact = self.errors[scheme][norm].max() < _ROUNDING
+        exact = self.norm(scheme, norm).max() < _ROUNDING
         return "exact" if exact else f"{self.fitted_rate(scheme, norm):.2f}"
 
     def rows(self) -> list[dict[str, Any]]:
@@ -138,6 +181,7 @@ class Convergence:
             {
                 "surface": self.surface,
                 "layout": self.layout,
+                "quantity": self.quantity,
                 "scheme": scheme,
                 "rows": shape[0],
                 "columns": shape[1],
@@ -164,6 +208,7 @@ class Convergence:
             {
                 "surface": self.surface,
                 "layout": self.layout,
+                "quantity": self.quantity,
                 "shapes": [list(s) for s in self.shapes],
                 "schemes": {
                     s: {
@@ -179,30 +224,25 @@ class Convergence:
 
     def to_csv(self, path: str | Path) -> None:
         """Write :meth:`rows` to a CSV file."""
-        write_csv(path, self.rows())
+        write_csv(path, by_column(self.rows()))
 
     def table(self, norm: str = "one") -> Table:
         """Rich table of one norm: errors, below them successive rates, at the end the fitted one.
 
         Where all errors are rounding the last column says "exact": their rate, about -2, is that of
-        eps / h^2.
+        eps / h^2. Vertices without a result are left out; the title says where there are any.
         """
-        table = text_table(
-            f"{self.surface}, {self.layout}: {norm}-norm of the error in H, and rates",
-            ["scheme", *(f"{r}x{c}" for r, c in self.shapes), "fit"],
-        )
+        rows: list[list[str]] = []
         for scheme in self.schemes:
             rates = ("" if np.isnan(r) else f"{r:.2f}" for r in self.rates(scheme, norm))
-            errors = self.errors[scheme][norm]
-            table.add_row(scheme, *map(short, errors), self.rate_label(scheme, norm))
-            table.add_row("", "", *rates, "", style="dim")
-        return table
-
-    def plot(self, norms: Sequence[str] = ("one", "inf")) -> Figure:
-        """Errors against cells, see :func:`quadcurv.viewing.figures.convergence_figure`."""
-        from quadcurv.viewing.figures import convergence_figure
-
-        return convergence_figure(self, norms)
+            rows.append([scheme, *map(short, self.norm(scheme, norm)), self.rate_label(scheme, norm)])
+            rows.append(["", "", *rates, ""])
+        title = f"{self.surface}, {self.layout}: {norm}-norm of the error in {self.symbol}, and rates"
+        lost = [scheme for scheme in self.schemes if self.undefined[scheme].any()]
+        if lost:
+            title += f"\n(vertices left out: {', '.join(f'{s} {self.undefined[s].tolist()}' for s in lost)})"
+        header = ["scheme", *(f"{r}x{c}" for r, c in self.shapes), "fit"]
+        return text_table(title, header, rows, dim=range(1, len(rows), 2))
 
     def __rich_console__(self, console: Console, options: Any) -> Iterator[Table]:
         yield self.table("one")
@@ -211,22 +251,25 @@ class Convergence:
 
 
 def convergence(
-    surface: Surface,
+    surface: str | Surface,
     schemes: str | Scheme | Iterable[str | Scheme],
     shapes: Iterable[int | tuple[int, int]],
     layout: str = "staggered",
+    quantity: Quantity = "mean_curvature",
 ) -> Convergence:
-    """Errors in the mean curvature of a surface on a sequence of refinements.
+    """Errors in a curvature of a surface on a sequence of refinements.
 
     Parameters
     ----------
-    surface : Surface
-        One of :mod:`quadcurv.surfaces`.
+    surface : str or Surface
+        One of :mod:`quadcurv.surfaces`, by its name in ``SURFACES`` or itself.
     schemes : str, Scheme or iterable of them
     shapes : iterable of int or (int, int)
-        Cells in the two directions; one number stands for both.
+        Cells in the two directions; one number stands for both. At least two, of different sizes.
     layout : {"staggered", "grid", "faces"}
         See :meth:`quadcurv.surfaces.Surface.sample`.
+    quantity : {"mean_curvature", "gaussian_curvature", "k1", "k2"}
+        All but the first by fits alone, "gaussian_curvature" also by "angle_defect".
 
     Returns
     -------
@@ -235,25 +278,101 @@ def convergence(
     Raises
     ------
     ValueError
-        Unknown scheme or layout, or fewer than two shapes.
+        Unknown surface, scheme, layout or quantity; shapes that are no numbers of cells, fewer than two of
+        them, or two of one size; a scheme that does not know the quantity.
+
+    Examples
+    --------
+    >>> run = convergence("torus", "liu", [16, 32, 64])
+    >>> run.rates("liu", "inf").round(1)
+    array([2., 2.])
     """
-    pairs = [(s, s) if isinstance(s, int | np.integer) else (int(s[0]), int(s[1])) for s in shapes]
-    if len(pairs) < 2:
-        raise ValueError(f"shapes: a rate needs at least two, got {pairs}")
-    chosen = schemes_of(schemes)
-    found: dict[str, list[dict[str, float]]] = {s.name: [] for s in chosen}
-    undefined: dict[str, list[int]] = {s.name: [] for s in chosen}
-    work = max(r * c for r, c in pairs) * len(chosen)
+    surface = surface_of(surface)
+    pairs = _pairs(shapes)
+    if quantity not in get_args(Quantity):
+        raise ValueError(f"quantity: expected one of {', '.join(get_args(Quantity))}, got {quantity!r}")
+    by_name = _by_name(schemes, quantity)
+    found: dict[str, list[dict[str, float]]] = {name: [] for name in by_name}
+    undefined: dict[str, list[int]] = {name: [] for name in by_name}
+    work = max(r * c for r, c in pairs) * len(by_name)
     for shape in progress(pairs, f"{surface.name}, {layout}", weight=work):
         mesh, xi, eta = surface.sample(shape, layout)
-        result = compare(mesh, chosen, surface.mean_curvature(xi, eta))
-        for name, values in result.norms().items():
-            found[name].append(values)
-            undefined[name].append(int(np.count_nonzero(np.isnan(result.mean_curvature[name]))))
+        exact, areas = _exact(surface, quantity, xi, eta), dual_areas(mesh, "liu")
+        evaluation = Evaluation(mesh, "extrapolate")
+        for name, scheme in by_name.items():
+            errors = _values(evaluation, scheme, quantity) - exact
+            found[name].append(norms(errors, areas))
+            undefined[name].append(int(np.count_nonzero(~np.isfinite(errors))))
     return Convergence(
         surface.name,
         layout,
-        tuple(pairs),
+        quantity,
+        pairs,
         {s: {k: np.array([e[k] for e in es]) for k in NORMS} for s, es in found.items()},
         {s: np.array(counts, np.int32) for s, counts in undefined.items()},
     )
+
+
+def _by_name(schemes: Any, quantity: Quantity) -> dict[str, Any]:
+    """Schemes by name; of the Gaussian curvature "angle_defect" is one too."""
+    given = [schemes] if isinstance(schemes, str | Scheme) else list(schemes)
+    defect = [s for s in given if quantity == "gaussian_curvature" and s == "angle_defect"]
+    others = [s for s in given if s not in defect]
+    return {name: name for name in defect} | {s.name: s for s in (schemes_of(others) if others else ())}
+
+
+def surface_of(surface: str | Surface) -> Surface:
+    """The surface of that name with its usual parameters, or the surface itself.
+
+    Raises
+    ------
+    ValueError
+        The name is not in ``SURFACES``.
+    """
+    if isinstance(surface, Surface):
+        return surface
+    if not isinstance(surface, str) or surface not in SURFACES:
+        raise ValueError(f"surface: expected a Surface or one of {', '.join(SURFACES)}, got {surface!r}")
+    return SURFACES[surface]()
+
+
+def _values(evaluation: Evaluation, scheme: Any, quantity: Quantity) -> Floats:
+    if quantity == "mean_curvature":
+        return evaluation.mean_curvature(scheme)
+    if quantity == "gaussian_curvature":
+        return gaussian_curvature(evaluation.mesh, scheme)
+    k1, k2, *_ = principal_curvatures(evaluation.mesh, scheme)
+    return k1 if quantity == "k1" else k2
+
+
+def _exact(surface: Surface, quantity: Quantity, xi: Floats, eta: Floats) -> Floats:
+    """Of k1 and k2, H +- sqrt(H^2 - K)."""
+    if quantity == "gaussian_curvature":
+        return surface.gaussian_curvature(xi, eta)
+    H = surface.mean_curvature(xi, eta)
+    if quantity == "mean_curvature":
+        return H
+    gap = np.sqrt(np.maximum(H**2 - surface.gaussian_curvature(xi, eta), 0))
+    return H + gap if quantity == "k1" else H - gap
+
+
+def _pairs(shapes: Iterable[int | tuple[int, int]]) -> tuple[tuple[int, int], ...]:
+    pairs = []
+    try:
+        for shape in shapes:
+            r, c = shape if isinstance(shape, Sequence) and len(shape) == 2 else (shape, shape)
+            pairs.append((operator.index(r), operator.index(c)))
+            if min(pairs[-1]) < 1:
+                raise ValueError
+    except (TypeError, ValueError):
+        raise ValueError(
+            f"shapes: expected whole numbers of cells, at least 1, or pairs of them, got {shapes!r}"
+        ) from None
+    sizes = _sizes(pairs)
+    if len(pairs) < 2 or len(np.unique(sizes)) < len(sizes):
+        raise ValueError(f"shapes: a rate needs at least two of different sizes, got {pairs}")
+    return tuple(pairs)
+
+
+def _sizes(shapes: Sequence[tuple[int, int]]) -> Floats:
+    return np.sqrt(np.prod(np.reshape(shapes, (-1, 2)), axis=1, dtype=float))

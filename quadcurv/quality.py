@@ -8,10 +8,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from quadcurv import drivers
 from quadcurv.boundary import EXTRAPOLATED, INTERIOR, OPEN, boundary_treatment, roughness
-from quadcurv.curvature import mean_curvature
 from quadcurv.io import as_mesh
-from quadcurv.schemes import SCHEMES
+from quadcurv.mesh import Mesh
+from quadcurv.schemes import SCHEMES, Fit, Scheme, as_scheme
 from quadcurv.stencils import Stencils
 from quadcurv.types import Bools, Floats
 
@@ -104,10 +105,16 @@ def summary(mesh: Any, schemes: Iterable[str] | None = None, boundary: str = "ex
             for name, code in (("interior", INTERIOR), ("extrapolated", EXTRAPOLATED), ("open", OPEN))
         },
         "undefined": {
-            name: int(np.count_nonzero(np.isnan(mean_curvature(mesh, name, boundary))))
+            name: int(np.count_nonzero(np.isnan(_mean_curvature(mesh, as_scheme(name), boundary))))
             for name in (SCHEMES if schemes is None else schemes)
         },
     }
+
+
+def _mean_curvature(mesh: Mesh, scheme: Scheme, boundary: str) -> Floats:
+    if isinstance(scheme, Fit):
+        return drivers.fit(mesh, scheme, boundary).mean
+    return drivers.run(mesh, scheme, ["mean_curvature"], boundary)["mean_curvature"]
 
 
 def _corners(stencils: Stencils) -> tuple[Floats, Bools]:

@@ -8,11 +8,16 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 import numpy as np
+from numpy.typing import ArrayLike
 from rich.console import Console
 from rich.progress import track
 from rich.table import Table
+from rich.text import Text
 
 T = TypeVar("T")
+
+WIDTH = 80
+"""Columns of text that a table may take."""
 
 
 def progress(items: Sequence[T], description: str, weight: int = 0) -> Iterable[T]:
@@ -23,19 +28,48 @@ def progress(items: Sequence[T], description: str, weight: int = 0) -> Iterable[
     return track(items, description, console=console, transient=True)
 
 
-def text_table(title: str, columns: Sequence[str]) -> Table:
-    """Empty rich table that fits 80 columns, the first one to the left."""
-    found = Table(
-        title=title,
+def text_table(
+    title: str, columns: Sequence[str], rows: Iterable[Sequence[str]], dim: Iterable[int] = ()
+) -> Table:
+    """Rich table that fits 80 columns, the first one to the left; no cell is read as markup.
+
+    Parameters
+    ----------
+    title : str
+    columns : sequence of str
+    rows : iterable of sequence of str
+    dim : iterable of int
+        Rows in a fainter colour.
+    """
+    table = Table(
+        title=Text(title, style="italic"),
         title_justify="left",
-        min_width=len(title),
+        min_width=min(len(title), WIDTH),
         box=None,
         padding=(0, 1, 0, 0),
         pad_edge=False,
     )
     for i, column in enumerate(columns):
-        found.add_column(column, justify="left" if i == 0 else "right", no_wrap=True)
-    return found
+        table.add_column(Text(column), justify="left" if i == 0 else "right", no_wrap=True)
+    faint = set(dim)
+    for i, row in enumerate(rows):
+        table.add_row(*map(Text, row), style="dim" if i in faint else None)
+    return table
+
+
+def text_tables(title: str, columns: Sequence[str], rows: Sequence[Sequence[str]]) -> list[Table]:
+    """As many tables as the columns need to fit 80 columns of text, each with the first of them."""
+    widths = [max(map(len, column)) + 1 for column in zip(columns, *rows, strict=True)]
+    tables: list[Table] = []
+    start = 1
+    while start < len(columns) or not tables:
+        end = start + 1
+        while end < len(columns) and widths[0] + sum(widths[start : end + 1]) <= WIDTH:
+            end += 1
+        part = [[row[0], *row[start:end]] for row in (columns, *rows)]
+        tables.append(text_table(title, part[0], part[1:]))
+        start = end
+    return tables
 
 
 def short(value: float) -> str:
@@ -44,12 +78,40 @@ def short(value: float) -> str:
     return f"{mantissa}e{int(exponent)}" if exponent else mantissa
 
 
-def write_csv(path: str | Path, rows: Sequence[Mapping[str, Any]]) -> None:
-    """Write rows of the same keys to a CSV file."""
-    with open(path, "w", newline="") as file:
-        writer = csv.DictWriter(file, list(rows[0]))
-        writer.writeheader()
-        writer.writerows(rows)
+def write_csv(path: str | Path, columns: Mapping[str, ArrayLike]) -> None:
+    """Write columns of one length to a CSV file, numbers in full precision.
+
+    Parameters
+    ----------
+    path : path-like
+    columns : mapping of str to (n,) or (n, 3) array_like
+        Vectors take three columns: NAME_x, NAME_y and NAME_z; those of the empty name x, y and z.
+
+    Raises
+    ------
+    ValueError
+        Columns of different lengths.
+    """
+    flat: dict[str, list[Any]] = {}
+    for name, given in columns.items():
+        values = np.asarray(given)
+        if values.ndim == 1:
+            flat[name] = values.tolist()
+            continue
+        for axis, component in zip("xyz", values.T, strict=True):
+            flat[f"{name}_{axis}" if name else axis] = component.tolist()
+    sizes = {name: len(values) for name, values in flat.items()}
+    if len(set(sizes.values())) > 1:
+        raise ValueError(f"columns: expected one length, got {sizes}")
+    with open(path, "w", newline="", encoding="utf-8") as file:
+        writer = csv.writer(file)
+        writer.writerow(flat)
+        writer.writerows(zip(*flat.values(), strict=True))
+
+
+def by_column(rows: Sequence[Mapping[str, Any]]) -> dict[str, list[Any]]:
+    """Records of the same keys as columns."""
+    return {name: [row[name] for row in rows] for name in rows[0]}
 
 
 def finite(value: Any) -> Any:

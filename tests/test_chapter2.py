@@ -145,7 +145,7 @@ def test_figures_are_the_same_on_every_run(tmp_path) -> None:
 
 
 def test_columns_of_different_lengths(tmp_path) -> None:
-    with pytest.raises(ValueError, match="shorter"):
+    with pytest.raises(ValueError, match="columns: expected one length"):
         common.write_csv(tmp_path, "table", {"a": [1, 2], "b": [1]})
 
 

@@ -4,9 +4,8 @@ import numpy as np
 import pytest
 
 from comparisons import chapter3, common, reproduction
-from quadcurv import StaggeredGrid, mean_curvature_normal
+from quadcurv import StaggeredGrid, mean_curvature_normal, viewing
 from quadcurv.surfaces import torus
-from quadcurv.viewing import window
 
 FIGURES = ["3_1", "3_4", "3_5", "3_7", "3_9", "3_10", "3_12", "3_henneberg", "3_others"]
 MAPS = ["3_2", "3_3", "3_6", "3_8", "3_11", "3_henneberg_map"]
@@ -168,7 +167,7 @@ def panels():
 
 
 def test_maps(tmp_path, panels) -> None:
-    if window.opengl_problem():
+    if viewing.opengl_problem():
         pytest.skip("nothing can render here")
     assert common.save_maps(tmp_path, "map", panels, "error", (-5, -1)) is None
     assert {f.name for f in tmp_path.iterdir()} == {"map.png", "map.svg", "map.csv"}
@@ -180,7 +179,7 @@ def test_maps(tmp_path, panels) -> None:
 
 
 def test_pages_where_nothing_can_render(tmp_path, panels, monkeypatch) -> None:
-    monkeypatch.setattr(window, "opengl_problem", lambda: "no usable OpenGL")
+    monkeypatch.setattr(viewing, "opengl_problem", lambda: "no usable OpenGL")
     assert common.save_maps(tmp_path, "map", panels, "error", (-5, -1)) == "no usable OpenGL"
     assert {f.name for f in tmp_path.iterdir()} == {"map_1.html", "map_2.html", "map.csv"}
 

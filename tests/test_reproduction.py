@@ -5,7 +5,7 @@ import pytest
 
 from comparisons import chapter2, reproduction
 from comparisons.common import Claim
-from quadcurv.viewing.window import opengl_problem
+from quadcurv.viewing import opengl_problem
 
 COMMITTED = reproduction.REPORT.read_text(encoding="utf-8")
 

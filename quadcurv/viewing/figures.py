@@ -2,19 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from io import BytesIO
+from typing import Any
 
 import numpy as np
 from matplotlib import rc_context
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from numpy.typing import ArrayLike
 
 from quadcurv.comparison import NORMS
-from quadcurv.convergence import Convergence
+from quadcurv.convergence import Convergence, fitted_rate
+from quadcurv.types import Floats
 
-# Okabe and Ito (2008): told apart with every kind of colour blindness.
-_COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#000000")
-_MARKERS = "os^Dv*XP<>"
+COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
+"""Of Okabe and Ito (2008): told apart with every kind of colour blindness."""
+MARKERS = ("o", "s", "^", "D", "v", "P", "X", "*", "<", ">")
+
+_UNITS = {"gaussian_curvature": "1/length²"}
 
 
 class _Figure(Figure):
@@ -25,7 +31,7 @@ class _Figure(Figure):
         return file.getvalue()
 
 
-def convergence_figure(convergence: Convergence, norms: Sequence[str] = ("one", "inf")) -> Figure:
+def plot(convergence: Convergence, norms: Sequence[str] = ("one", "inf")) -> Figure:
     """Errors against cells in one direction on logarithmic axes, one panel a norm.
 
     Parameters
@@ -37,42 +43,32 @@ def convergence_figure(convergence: Convergence, norms: Sequence[str] = ("one", 
     Returns
     -------
     matplotlib.figure.Figure
-        The legend gives the fitted rate in each panel. Errors that are exactly 0 have no place on the
-        axis and are left out.
+        The legend gives the fitted rate in each panel. Errors that are exactly 0 lie on the lower edge,
+        with open markers.
 
     Raises
     ------
     ValueError
         No or unknown norms.
     """
-    if not norms or not set(norms) <= set(NORMS):
+    if not norms or isinstance(norms, str) or not set(norms) <= set(NORMS):
         raise ValueError(f"norms: expected any of {', '.join(NORMS)}, got {list(norms)}")
-    n = convergence.sizes
+    n, symbol = convergence.sizes, convergence.symbol
+    unit = _UNITS.get(convergence.quantity, "1/length")
     with rc_context({"font.size": 9, "axes.spines.top": False, "axes.spines.right": False}):
         figure = _Figure(
             figsize=(3.6 * len(norms), 3.4 + 0.11 * len(convergence.schemes)), layout="constrained"
         )
-        figure.suptitle(f"Mean curvature on {convergence.surface.replace('_', ' ')}, {convergence.layout}")
+        figure.suptitle(f"{symbol} on {convergence.surface.replace('_', ' ')}, {convergence.layout}")
         for axes, norm in zip(figure.subplots(1, len(norms), squeeze=False)[0], norms, strict=True):
-            axes.set_xscale("log", base=2)
-            axes.set_yscale("log")
-            axes.set(xlabel="cells in one direction", ylabel=f"{norm}-norm of the error in H (1/length)")
+            series = {
+                f"{scheme}: {convergence.rate_label(scheme, norm)}": convergence.norm(scheme, norm)
+                for scheme in convergence.schemes
+            }
+            convergence_plot(axes, n, series, joined=True)
+            axes.set(xlabel="cells in one direction", ylabel=f"{norm}-norm of the error in {symbol} ({unit})")
             axes.set_xticks(n, [f"{cells:.0f}" for cells in n])
-            axes.minorticks_off()
             axes.grid(alpha=0.3, linewidth=0.5)
-            for i, scheme in enumerate(convergence.schemes):
-                errors = np.array(convergence.errors[scheme][norm])
-                errors[errors == 0] = np.nan
-                axes.plot(
-                    n,
-                    errors,
-                    color=_COLOURS[i % len(_COLOURS)],
-                    marker=_MARKERS[i % len(_MARKERS)],
-                    markersize=4.5,
-                    linewidth=1.2,
-                    linestyle="-" if i < len(_COLOURS) else "--",
-                    label=f"{scheme}: {convergence.rate_label(scheme, norm)}",
-                )
             axes.legend(
                 title="fitted rate",
                 loc="upper center",
@@ -83,3 +79,93 @@ def convergence_figure(convergence: Convergence, norms: Sequence[str] = ("one", 
                 frameon=False,
             )
     return figure
+
+
+def convergence_plot(
+    axes: Axes,
+    sizes: ArrayLike,
+    series: Mapping[str, ArrayLike],
+    fit: Mapping[str, tuple[float, float]] | None = None,
+    slopes: Sequence[float] = (),
+    rounding: tuple[ArrayLike, str] | None = None,
+    joined: bool = False,
+) -> dict[str, float]:
+    """Errors against size on logarithmic axes, with best-fit lines as the thesis draws them.
+
+    Parameters
+    ----------
+    axes : matplotlib axes
+        Drawn into; the caller labels them.
+    sizes : array_like, shape (m,)
+        Number of points or cells in one direction.
+    series : mapping from label to array_like, shape (m,)
+        Errors. Zeros lie on the lower edge of the plot with an open marker; NaN is left out.
+    fit : mapping from label to (first, last) size, optional
+        The sizes to fit, between two vertical dashed lines; a label not in it has no line.
+    slopes : sequence of float
+        Orders to show by grey reference lines above the last errors.
+    rounding : (array_like of shape (m,), label), optional
+        What rounding alone is expected to give, shown dotted.
+    joined : bool
+        Whether a thin line joins the errors.
+
+    Returns
+    -------
+    dict
+        Fitted rate by label, for the labels in `fit`; NaN, and no line, where an error is zero.
+    """
+    n = np.asarray(sizes, dtype=float)
+    errors = {label: np.asarray(e, dtype=float) for label, e in series.items()}
+    positive = np.concatenate([e[np.isfinite(e) & (e > 0)] for e in errors.values()])
+    floor = positive.min() / 10 if positive.size else np.finfo(float).eps
+    axes.set_xscale("log", base=2)
+    axes.set_yscale("log")
+    axes.minorticks_off()
+    rates: dict[str, float] = {}
+    for i, (label, e) in enumerate(errors.items()):
+        style: dict[str, Any] = {"color": COLOURS[i % len(COLOURS)], "marker": MARKERS[i % len(MARKERS)]}
+        text = label
+        if fit and label in fit:
+            rates[label] = rate = _fitted_line(axes, n, e, fit[label], style["color"])
+            text = f"{label}: rate {rate:.2f}" if np.isfinite(rate) else label
+        line = ("-" if i < len(COLOURS) else "--") if joined else "none"
+        if joined:
+            style |= {"linewidth": 1.2, "markersize": 4.5}
+        axes.plot(n, np.where(e == 0, np.nan, e), linestyle=line, label=text, **style)
+    for i, e in enumerate(errors.values()):
+        zero = e == 0
+        if zero.any():
+            style = {"color": COLOURS[i % len(COLOURS)], "marker": MARKERS[i % len(MARKERS)]}
+            axes.plot(n[zero], np.full(zero.sum(), floor), linestyle="none", fillstyle="none", **style)
+            axes.set_ylim(bottom=floor)
+    for k, edge in enumerate(sorted({size for span in (fit or {}).values() for size in span})):
+        axes.axvline(
+            edge, color="0.4", linestyle="--", linewidth=0.9, label=None if k else "range of the fit"
+        )
+    top = max((e[-1] for e in errors.values() if e[-1] > 0), default=floor)
+    for slope in slopes:
+        _guide(axes, n, 4 * top, slope)
+    if rounding is not None:
+        level, label = rounding
+        axes.plot(n, level, color="0.3", linestyle=":", label=f"rounding, {label}")
+    axes.legend()
+    return rates
+
+
+def _fitted_line(axes: Axes, n: Floats, errors: Floats, span: tuple[float, float], colour: str) -> float:
+    """Least-squares line over a range of sizes; its rate, NaN and no line where there is none."""
+    inside = (n >= span[0]) & (n <= span[1])
+    rate = fitted_rate(n[inside], errors[inside])
+    if np.isfinite(rate):
+        factor = np.exp(np.log(errors[inside] * n[inside] ** rate).mean())
+        axes.plot(n[inside], factor * n[inside] ** -rate, color=colour)
+    return rate
+
+
+def _guide(axes: Axes, n: Floats, end: float, slope: float) -> None:
+    """Grey line of an order over the finer half of the sizes."""
+    tail = n[len(n) // 2 :]
+    guide = end * (tail / n[-1]) ** -slope
+    axes.plot(tail, guide, color="0.6", linewidth=0.9)
+    middle = len(tail) // 2
+    axes.text(tail[middle], guide[middle], f" order {slope:g}", color="0.4", va="bottom")

@@ -1,101 +1,188 @@
-"""pyvista plugin: ``plotter.quadcurv.add_error_map()``.
-
-pyvista finds this module through the entry-point group "pyvista.plotter_components" when
-``plotter.quadcurv`` is first asked for. Apart from the accessor, which needs nothing of pyvista's plotting.
-"""
+"""What scenes of pyvista are made of: surfaces, coloured strips, text, the colour bar, the camera."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from quadcurv.types import Floats, Ints
+from quadcurv.viewing.geometry import viewpoint
+from quadcurv.viewing.scale import NAN_COLOUR, ZERO_COLOUR, Field
 
 if TYPE_CHECKING:
     import pyvista as pv
+    from vtkmodules.vtkRenderingCore import vtkActor2D
 
-    from quadcurv.schemes import Scheme
-
-
-class PlotterComponent:
-    """Error maps for scenes of one's own: ``plotter.quadcurv``.
-
-    Parameters
-    ----------
-    plotter : pyvista.Plotter
-    """
-
-    def __init__(self, plotter: pv.Plotter) -> None:
-        self._plotter: Any = plotter
-
-    def add_error_map(
-        self,
-        mesh: Any,
-        exact: Any,
-        scheme: str | Scheme = "finite_volume",
-        limits: tuple[float, float] | None = None,
-        **options: Any,
-    ) -> pv.Actor:
-        """Add a mesh coloured by the error |H - exact| on a logarithmic scale.
-
-        Parameters
-        ----------
-        mesh
-            Anything :func:`quadcurv.as_mesh` takes. Values of a staggered grid belong to its cells.
-        exact : array_like or callable
-            Exact mean curvature in 1 / length; see :func:`quadcurv.comparison.compare`.
-        scheme : str, Scheme or Fit
-            A name in ``quadcurv.SCHEMES``, or one of ``quadcurv.schemes``.
-        limits : (float, float), optional
-            Ends of the scale in 1 / length, such as (1e-6, 1e-1), to share it among maps; by default
-            the whole decades around the errors.
-        **options
-            For :meth:`pyvista.Plotter.add_mesh`; the defaults here are no lighting, faint edges and a
-            bar of powers of ten.
-
-        Returns
-        -------
-        pyvista.Actor
-            Its array is "log10 error". NaN is grey; what is exactly 0 is pale pink.
-
-        Raises
-        ------
-        ValueError
-            As :func:`quadcurv.comparison.compare`; limits that are not positive and ascending.
-        """
-        from quadcurv.comparison import compare
-        from quadcurv.viewing import fields
-        from quadcurv.viewing.window import polydata
-
-        comparison = compare(mesh, [scheme], exact)
-        shown = fields.field(comparison, "error")
-        if limits is not None:
-            shown = shown.within(limits)
-        points, faces, on_cells = fields.drawn(comparison.mesh)
-        surface = polydata(points, faces)
-        (name,) = comparison.schemes
-        (surface.cell_data if on_cells else surface.point_data)["log10 error"] = shown.values[name]
-        bar = {
-            "title": f"error in H, {name}\n",  # the empty line keeps it off the labels
-            "fmt": "1e%.0f",
-            "n_labels": round(shown.limits[1] - shown.limits[0]) + 1,
-        }
-        defaults = {
-            "cmap": shown.colours,
-            "clim": shown.limits,
-            "nan_color": fields.NAN_COLOUR,
-            "lighting": False,
-            "show_edges": True,
-            "edge_opacity": 0.25,
-            "scalar_bar_args": bar,
-        }
-        if (shown.values[name] < shown.limits[0]).any():
-            defaults["below_color"] = fields.ZERO_COLOUR
-            bar["below_label"] = "exactly 0"
-        return self._plotter.add_mesh(surface, scalars="log10 error", **(defaults | options))
+HISTOGRAM = 0.1  # its height to that of a view
+_LEGEND_HEIGHT = 120.0  # pixels, at scale 1
 
 
-def _register() -> None:
+def polydata(points: Floats, faces: Ints) -> pv.PolyData:
+    """Surface of pyvista; faces (m, 4) end with -1 where they are triangles."""
     import pyvista as pv
 
-    pv.register_plotter_component("quadcurv")(PlotterComponent)
+    if (faces[:, 3] >= 0).all():
+        return pv.PolyData.from_regular_faces(points, faces)  # type: ignore[arg-type]  # any integer will do
+    sized = np.insert(faces, 0, np.where(faces[:, 3] < 0, 3, 4), axis=1)
+    return pv.PolyData(np.array(points), sized[sized >= 0])
 
 
-_register()
+def lookup_table(field: Field) -> Any:
+    """Colours of a field."""
+    import pyvista as pv
+
+    table = pv.LookupTable(nan_color=NAN_COLOUR)
+    colour_by(table, field)
+    return table
+
+
+def colour_by(table: Any, field: Field) -> None:
+    """Make a lookup table that of another field."""
+    table.apply_cmap(field.colours)
+    table.scalar_range = field.limits
+    table.below_range_color = ZERO_COLOUR if field.shows_zero else None
+
+
+def surface_style(shading: bool = False) -> dict[str, Any]:
+    """Options of `Plotter.add_mesh` for a coloured surface: colours as they are, or lit."""
+    light = {"ambient": 0.25, "specular": 0.2} if shading else {"lighting": False}
+    return {"edge_opacity": 0.25, **light}
+
+
+@dataclass(frozen=True)
+class Scene:
+    """Drawing into the current view of a plotter.
+
+    Attributes
+    ----------
+    plotter : pyvista.Plotter
+    scale : float
+        Size of letters and lines.
+    """
+
+    plotter: Any
+    scale: float
+
+    def draw(self, mesh: pv.PolyData, **style: Any) -> Any:
+        """Lines, dots or glyphs over a surface, before what of it lies at the same depth."""
+        actor = self.plotter.add_mesh(
+            mesh,
+            lighting=False,
+            pickable=False,
+            reset_camera=False,
+            show_scalar_bar=False,
+            render_points_as_spheres=True,
+            render=False,
+            **style,
+        )
+        actor.mapper.SetResolveCoincidentTopologyToPolygonOffset()
+        for offset in ("Line", "Polygon"):
+            getattr(actor.mapper, f"SetRelativeCoincidentTopology{offset}OffsetParameters")(-2.0, -2.0)
+        actor.mapper.SetRelativeCoincidentTopologyPointOffsetParameter(-20.0)
+        return actor
+
+    def text(self, text: str, position: tuple[float, float], size: float, name: str | None = None) -> None:
+        """Text centred at a position of the view, in coordinates from 0 to 1."""
+        import matplotlib as mpl
+
+        actor = self.plotter.add_text(
+            text.replace("|", "∣"),  # VTK takes an ASCII bar for a column's end
+            position=position,
+            font_size=size * self.scale,
+            color="black",
+            viewport=True,
+            font_file=f"{mpl.get_data_path()}/fonts/ttf/DejaVuSans.ttf",
+            name=name,
+            render=False,
+        )
+        actor.prop.justification_horizontal = "center"
+        actor.prop.justification_vertical = "center"
+        actor.prop.background_color = "white"  # arrows may reach behind a title
+        actor.prop.background_opacity = 0.85
+
+    def strip(
+        self, edges: Floats, colours: ArrayLike, bottom: float = 0.4, tops: ArrayLike = 0.62
+    ) -> vtkActor2D:
+        """Coloured cells side by side, between edges from 0 to 1."""
+        from vtkmodules.vtkRenderingCore import vtkActor2D, vtkCoordinate, vtkPolyDataMapper2D
+
+        left, right, low, high, zero = np.broadcast_arrays(edges[:-1], edges[1:], bottom, tops, 0.0)
+        corners = np.array([(left, low, zero), (right, low, zero), (right, high, zero), (left, high, zero)])
+        faces = np.arange(4 * len(left), dtype=np.int32).reshape(-1, 4)
+        strip = polydata(np.moveaxis(corners, 2, 0).reshape(-1, 3), faces)
+        strip.cell_data["colours"] = np.array(colours, np.uint8)
+        strip.cell_data.active_scalars_name = "colours"
+        coordinate = vtkCoordinate()
+        coordinate.SetCoordinateSystemToNormalizedViewport()
+        mapper = vtkPolyDataMapper2D()
+        mapper.SetInputData(strip)
+        mapper.SetTransformCoordinate(coordinate)
+        mapper.SetScalarModeToUseCellData()
+        actor = vtkActor2D()
+        actor.SetMapper(mapper)
+        self.plotter.renderer.AddViewProp(actor)
+        return actor
+
+    def legend(self, field: Field, table: Any, marks: Sequence[tuple[str, str]]) -> None:
+        """Colour bar with title above and labels below, and patches of all colours beyond it."""
+        import pyvista as pv
+
+        self.plotter.renderer.RemoveAllViewProps()
+        low, high = field.limits
+        patches = [*field.patches(), *marks]
+        left, right = 0.08, 0.92 - 0.11 * len(patches)
+        self.strip(np.linspace(left, right, 257), table.values[:, :3])
+        self.text(field.title, ((left + right) / 2, 0.82), 11)
+        for place, label in field.ticks():
+            self.text(label, (left + (place - low) / (high - low) * (right - left), 0.2), 10)
+        for i, (label, colour) in enumerate(patches):
+            x = right + 0.11 * (i + 1)
+            for margin, fill in ((1.0, "grey"), (0.0, colour)):  # an outline, for what is pale
+                dx, dy = margin / self.plotter.window_size[0], margin / _LEGEND_HEIGHT
+                ends = np.array([x - 0.03 - dx, x + 0.03 + dx])
+                self.strip(ends, [pv.Color(fill).int_rgb], 0.4 - dy, 0.62 + dy)
+            self.text(label, (x, 0.2), 9)
+
+    def histogram(self, parts: Floats, highest: float, table: Any) -> list[vtkActor2D]:
+        """Bars along the lower edge of the view, in the colours of equal parts of the scale."""
+        colours = table.values[np.linspace(0, 255, parts.size).astype(int), :3]
+        heights = HISTOGRAM * parts / highest
+        outline = heights + 0.004 * (heights > 0)  # for what is pale
+        edges = np.linspace(0.1, 0.9, parts.size + 1)
+        return [
+            self.strip(edges, fill, 0.0, tops)
+            for fill, tops in (([[128] * 3] * parts.size, outline), (colours, heights))
+        ]
+
+
+def look_at(
+    camera: pv.Camera,
+    points: Floats,
+    direction: tuple[float, float, float] | None = None,
+    aspect: float = 1.0,
+) -> None:
+    """Fit the points into a view of some width to its height, the upper tenth left to the title."""
+    towards, up = viewpoint(points, direction)
+    right = np.cross(up, towards)
+    right /= np.linalg.norm(right)
+    axes = np.array([right, np.cross(towards, right), towards])
+    seen = points @ axes.T
+    centre, half = (seen.max(axis=0) + seen.min(axis=0)) / 2, np.ptp(seen, axis=0) / 2
+    distance = 4 * np.linalg.norm(half)
+    camera.focal_point = centre @ axes
+    camera.position = centre @ axes + distance * towards
+    camera.up = axes[1]
+    camera.parallel_projection = True
+    camera.parallel_scale = float(max(half[0] / 0.96 / aspect, half[1] / 0.88)) or 1.0
+    camera.SetWindowCenter(0, 0.08)
+
+
+def make_room(camera: pv.Camera, room: bool) -> None:
+    """Draw all smaller above a histogram, or as before."""
+    factor = 0.88 / (0.88 - HISTOGRAM)
+    camera.parallel_scale *= factor if room else 1 / factor
+    camera.SetWindowCenter(0, 0.08 - HISTOGRAM * room)

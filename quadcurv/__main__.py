@@ -1,0 +1,5 @@
+"""``python -m quadcurv``: the command line."""
+
+from quadcurv.cli import main
+
+main()

@@ -1,0 +1,14 @@
+from .fields import FIELDS as FIELDS
+from .fields import Fields as Fields
+from .figures import convergence_plot as convergence_plot
+from .figures import plot as plot
+from .opengl import NoOpenGLError as NoOpenGLError
+from .opengl import opengl_problem as opengl_problem
+from .opengl import window_problem as window_problem
+from .panels import surfaces_figure as surfaces_figure
+from .show import html_page as html_page
+from .show import maps as maps
+from .show import save_maps as save_maps
+from .show import view as view
+from .style import Style as Style
+from .views import View as View

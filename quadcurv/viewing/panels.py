@@ -1,0 +1,111 @@
+"""Values on several surfaces side by side in one figure, for papers: what the maps of comparisons are not."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from matplotlib.cm import ScalarMappable
+from matplotlib.colors import LogNorm
+from matplotlib.figure import Figure
+from numpy.typing import ArrayLike, NDArray
+
+from quadcurv.mesh import Mesh
+from quadcurv.types import Floats
+from quadcurv.viewing.geometry import drawn
+from quadcurv.viewing.opengl import NoOpenGLError, opengl_problem
+from quadcurv.viewing.scale import NAN_COLOUR
+from quadcurv.viewing.scene import polydata, surface_style
+
+_COLOURS = "viridis"
+_PIXELS = 1200
+_MANY = 20_000  # faces, beyond which edges cannot be told apart
+
+
+def surfaces_figure(
+    panels: Mapping[str, tuple[Mesh, ArrayLike]],
+    label: str = "",
+    decades: tuple[int, int] | None = None,
+    camera: tuple[float, float, float] = (1.0, 1.0, 0.7),
+    height: float = 3.2,
+) -> Figure:
+    """Paint values on surfaces side by side, on one scale.
+
+    Parameters
+    ----------
+    panels : mapping from title to (mesh, values)
+        Values at the vertices of the mesh, or in the cells of a staggered grid. NaN is grey.
+    label : str
+        Of the colour bar.
+    decades : (low, high), optional
+        Powers of ten at the ends of the logarithmic scale. Without them values only show the shape: lit,
+        on a linear scale, without a bar.
+    camera : (x, y, z)
+        Direction from the surface to the viewer; z is up.
+    height : float
+        Of the figure in inches; the panels give its width.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+
+    Raises
+    ------
+    NoOpenGLError
+        Nothing can render here.
+    """
+    problem = opengl_problem()
+    if problem:
+        raise NoOpenGLError(problem)
+    values = {title: np.ravel(np.asarray(given, float)) for title, (_, given) in panels.items()}
+    images = {title: _picture(mesh, values[title], decades, camera) for title, (mesh, _) in panels.items()}
+    widths = [image.shape[1] / image.shape[0] for image in images.values()]
+    width = 0.9 * height * sum(widths) + 0.3 * len(images) + (0.9 if decades else 0)
+    figure = Figure(figsize=(width, height))
+    axes = figure.subplots(1, len(images), width_ratios=widths, squeeze=False)
+    for ax, (title, image) in zip(axes.flat, images.items(), strict=True):
+        ax.imshow(image, interpolation="antialiased")
+        ax.set_title(title)
+        ax.axis("off")
+    if decades is not None:
+        low, high = (10.0**power for power in decades)
+        known = np.concatenate(list(values.values()))
+        ends = {(True, True): "both", (True, False): "min", (False, True): "max"}
+        extend = ends.get((bool((known < low).any()), bool((known > high).any())), "neither")
+        scale = ScalarMappable(LogNorm(low, high), _COLOURS)
+        figure.colorbar(scale, ax=axes, label=label, extend=extend, shrink=0.8, aspect=25, pad=0.03)
+    return figure
+
+
+def _picture(
+    mesh: Mesh, values: Floats, decades: tuple[int, int] | None, camera: tuple[float, float, float]
+) -> NDArray[np.uint8]:
+    """Painted surface, without the empty margin; edges are drawn where they can be told apart."""
+    import pyvista as pv
+
+    points, faces, on_cells = drawn(mesh)
+    surface = polydata(np.array(points), faces)
+    style: dict[str, Any] = {"smooth_shading": True, **surface_style(shading=True)}
+    if decades is not None:
+        values = np.log10(np.maximum(values, 10.0 ** decades[0]))
+        style = {"clim": decades, **surface_style()}
+    (surface.cell_data if on_cells else surface.point_data)["value"] = values
+    with pv.vtk_verbosity("off"):  # it would warn of every way to draw that it tries in vain
+        plotter: Any = pv.Plotter(off_screen=True, window_size=[_PIXELS, _PIXELS])
+        plotter.enable_parallel_projection()
+        plotter.enable_anti_aliasing("msaa")
+        plotter.add_mesh(
+            surface,
+            scalars="value",
+            cmap=_COLOURS,
+            show_edges=surface.n_cells <= _MANY,
+            nan_color=NAN_COLOUR,
+            show_scalar_bar=False,
+            **style,
+        )
+        plotter.view_vector(camera, viewup=(0, 0, 1))
+        image = np.asarray(plotter.screenshot(transparent_background=True, return_img=True))
+        plotter.close()
+    rows, columns = (np.flatnonzero(image[..., 3].any(axis=axis)) for axis in (1, 0))
+    return image[rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1]

@@ -1,0 +1,141 @@
+"""Maps of a comparison, or of a mesh: in a window, as a scene of pyvista, as a picture or a page."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from quadcurv.comparison import Comparison, compare
+from quadcurv.viewing.opengl import NoOpenGLError, opengl_problem, window_problem
+from quadcurv.viewing.page import Page, make_page
+from quadcurv.viewing.style import Style
+from quadcurv.viewing.views import View
+from quadcurv.viewing.window import window
+
+if TYPE_CHECKING:
+    import pyvista as pv
+
+
+def view(
+    what: Any,
+    field: str = "mean_curvature",
+    style: Style | None = None,
+    refined: Callable[[int], Comparison] | None = None,
+) -> None:
+    """Open a window with linked views, one a scheme, until it is closed.
+
+    Parameters
+    ----------
+    what : Comparison, or anything :func:`quadcurv.as_mesh` takes
+        A mesh is shown with its curvature by jet.
+    field : str
+        What the colours show first: of :data:`quadcurv.viewing.FIELDS`, or "difference to SCHEME".
+    style : Style
+    refined : callable, optional
+        Comparison at a refinement level 0 to 5, for a slider; `what` is that of level 2.
+
+    Raises
+    ------
+    NoOpenGLError
+        There is no display or no usable OpenGL.
+    ValueError
+        Unknown field; limits of the style that do not fit its scale.
+
+    See Also
+    --------
+    quadcurv.viewing.window : the keys and buttons.
+    """
+    problem = window_problem()
+    if problem:
+        raise NoOpenGLError(problem)
+    window(_comparison(what), field, style, refined).plotter.show()
+
+
+def maps(what: Any, field: str = "error", style: Style | None = None) -> pv.Plotter:
+    """Scene for a file or a notebook, with one linked view a scheme and one colour bar.
+
+    Signed fields have a diverging scale, its ends passed on 5 % of the area; errors a logarithmic one of
+    whole decades. NaN is grey; in errors what is exactly 0 is pale pink.
+
+    Parameters
+    ----------
+    what, field, style
+        As for :func:`view`.
+
+    Returns
+    -------
+    pyvista.Plotter
+
+    Raises
+    ------
+    ValueError
+        Unknown field; limits of the style that do not fit its scale.
+    """
+    return View(_comparison(what), field, style, off_screen=True).plotter
+
+
+def html_page(what: Any, field: str = "mean_curvature", style: Style | None = None) -> Page:
+    """Page in HTML with linked views, one a scheme, and every field to choose from.
+
+    It needs neither a network nor, where it is made, OpenGL; a notebook shows it in a frame.
+
+    Parameters
+    ----------
+    what, field, style
+        As for :func:`view`; but for the size of the style, which is the browser's.
+
+    Returns
+    -------
+    Page
+
+    Raises
+    ------
+    ValueError
+        Unknown field; limits of the style that do not fit its scale.
+
+    Warns
+    -----
+    UserWarning
+        It would take more than 20 MB: fields were left out, or it is larger nevertheless.
+    """
+    return make_page(_comparison(what), field, style)
+
+
+def save_maps(what: Any, path: str | Path, field: str = "error", style: Style | None = None) -> None:
+    """Write maps to a file: one linked view a scheme, one colour bar for all.
+
+    Parameters
+    ----------
+    what, field, style
+        As for :func:`view`.
+    path : path-like
+        ``.png`` for a picture, which needs a usable OpenGL; ``.html`` for a page with linked views that
+        needs none and no network.
+
+    Raises
+    ------
+    NoOpenGLError
+        A picture is asked for where nothing can render.
+    ValueError
+        Any other suffix; as for :func:`view`.
+    """
+    path = Path(path)
+    if path.suffix == ".html":
+        html_page(what, field, style).save(path)
+    elif path.suffix == ".png":
+        problem = opengl_problem()
+        if problem:
+            raise NoOpenGLError(problem)
+        import pyvista as pv
+
+        with pv.vtk_verbosity("off"):  # it would warn of every way to draw that it tries in vain
+            plotter = maps(what, field, style)
+            plotter.screenshot(path)
+            plotter.close()
+    else:
+        raise ValueError(f"path: expected a name ending in .png or .html, got {path.name}")
+
+
+def _comparison(what: Any) -> Comparison:
+    return what if isinstance(what, Comparison) else compare(what, "jet")
