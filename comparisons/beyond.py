@@ -23,7 +23,7 @@ from comparisons.common import (
 )
 from quadcurv import QuadGrid, QuadMesh, mean_curvature
 from quadcurv.boundary import ghost_layer
-from quadcurv.convergence import convergence, fitted_rate
+from quadcurv.refinement import convergence, fitted_rate
 from quadcurv.schemes import cotan
 from quadcurv.schemes.finite_volume import FINITE_VOLUME
 from quadcurv.stencils import Stencils, grid_faces

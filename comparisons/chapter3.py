@@ -27,7 +27,7 @@ from comparisons.common import (
     save_maps,
 )
 from quadcurv import StaggeredGrid, mean_curvature, mean_curvature_normal
-from quadcurv.convergence import fitted_rate
+from quadcurv.refinement import fitted_rate
 from quadcurv.surfaces import (
     Surface,
     catenoid,

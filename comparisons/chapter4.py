@@ -23,7 +23,7 @@ from comparisons.common import (
 )
 from quadcurv import surfaces, viewing
 from quadcurv.comparison import compare
-from quadcurv.convergence import Convergence, convergence
+from quadcurv.refinement import Convergence, convergence
 from quadcurv.schemes import SCHEMES, cotan
 from quadcurv.schemes.cotan import cotan_matrices
 from quadcurv.schemes.finite_volume import FINITE_VOLUME

@@ -24,8 +24,8 @@ from scipy.stats import spearmanr
 
 from comparisons.common import COLOURS, MARKERS, arguments, figure, paper_style, save_figure, write_csv
 from quadcurv import SCHEMES, Fit, QuadGrid, QuadMesh, Scheme, mean_curvature
-from quadcurv.convergence import fitted_rate
 from quadcurv.estimate import disagreement
+from quadcurv.refinement import fitted_rate
 from quadcurv.schemes import fundamental_forms
 from quadcurv.surfaces import (
     Surface,

@@ -16,7 +16,7 @@ from rich.console import Console
 from comparisons import beyond
 from comparisons.common import OUTPUT, Claim, arguments, below, claims_markdown, print_claims
 from quadcurv import QuadGrid, QuadMesh, mean_curvature
-from quadcurv.convergence import convergence
+from quadcurv.refinement import convergence
 from quadcurv.surfaces import cubed_ellipsoid, torus
 
 Results = dict[str, float]

@@ -1,7 +1,6 @@
 from . import curves, schemes, surfaces
 from .boundary import boundary_treatment, one_rings
 from .comparison import compare
-from .convergence import convergence
 from .curvature import (
     curvatures,
     dual_areas,
@@ -18,10 +17,12 @@ from .curvature import (
 from .io import as_mesh, attach, read, read_values, to_pymeshlab, to_pyvista, to_trimesh, write
 from .kernels.ranges import set_threads
 from .mesh import QuadGrid, QuadMesh, StaggeredGrid
-from .quality import quality, summary
+from .mesh_quality import quality, summary
+from .refinement import convergence
 from .repair import as_grid, duplicate_points, flip, merge_points, orient, pair_triangles
 from .schemes import SCHEMES, Curvatures, Fit, Laplacian
 from .types import MeshError, MeshWarning, PrecisionWarning
+from .viewing import plot, view
 
 __version__: str
 __all__: list[str]

@@ -117,7 +117,7 @@ def curvature(
     output
         File to write: .ply or .vtp with the mesh and its faces, .glb triangulated, .csv with a row a vertex.
     """
-    from quadcurv.quality import quality
+    from quadcurv.mesh_quality import quality
 
     found = read(mesh)
     H = mean_curvature(found, as_scheme(scheme))
@@ -248,8 +248,8 @@ def main(arguments: Iterable[str] | None = None) -> None:
 
 
 def _counts(mesh: Mesh) -> str:
-    """Lines of what a mesh holds, see :func:`quadcurv.quality.summary`."""
-    from quadcurv.quality import summary
+    """Lines of what a mesh holds, see :func:`quadcurv.mesh_quality.summary`."""
+    from quadcurv.mesh_quality import summary
 
     counts = summary(mesh, schemes=())
     faces = f"faces: {counts['quads']} quads, {counts['triangles']} triangles"

@@ -16,7 +16,7 @@ import quadcurv as qc
 from quadcurv import SCHEMES, Laplacian, MeshError, MeshWarning, QuadGrid, QuadMesh, StaggeredGrid, surfaces
 from quadcurv.boundary import OPEN, boundary_treatment, roughness
 from quadcurv.comparison import compare
-from quadcurv.quality import quality, summary
+from quadcurv.mesh_quality import quality, summary
 
 LAPLACIANS = [name for name, scheme in SCHEMES.items() if isinstance(scheme, Laplacian)]
 every_scheme = pytest.mark.parametrize("scheme", SCHEMES)

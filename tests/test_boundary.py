@@ -27,7 +27,7 @@ from quadcurv.boundary import (
     ghosts,
     with_ghosts,
 )
-from quadcurv.convergence import fitted_rate
+from quadcurv.refinement import fitted_rate
 
 every_laplacian = pytest.mark.parametrize(
     "scheme", [name for name, scheme in SCHEMES.items() if isinstance(scheme, Laplacian)]

@@ -10,7 +10,7 @@ from rich.console import Console
 
 from comparisons import chapter4
 from quadcurv import mean_curvature, surfaces
-from quadcurv.convergence import Convergence, convergence
+from quadcurv.refinement import Convergence, convergence
 
 SIZES = [16, 32, 64, 128, 256]
 

@@ -12,7 +12,7 @@ from rich.console import Console
 
 from quadcurv import surfaces
 from quadcurv.comparison import NORMS
-from quadcurv.convergence import convergence, fitted_rate, successive_rates
+from quadcurv.refinement import convergence, fitted_rate, successive_rates
 
 
 def printed(thing, width=80):

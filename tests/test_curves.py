@@ -4,8 +4,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from quadcurv import curves
-from quadcurv.convergence import fitted_rate
 from quadcurv.curves import Curve, curvature, curvature_normal, frenet_frame, staggered, torsion
+from quadcurv.refinement import fitted_rate
 
 SIZES = [64, 128, 256, 512]
 

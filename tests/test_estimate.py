@@ -8,8 +8,8 @@ from scipy.stats import spearmanr
 
 import quadcurv as qc
 from quadcurv import surfaces
-from quadcurv.convergence import fitted_rate
 from quadcurv.estimate import disagreement, richardson
+from quadcurv.refinement import fitted_rate
 from quadcurv.schemes import fundamental_forms, jet
 
 

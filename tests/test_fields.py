@@ -11,7 +11,7 @@ from maps import made_up
 
 from quadcurv import QuadGrid, QuadMesh, surfaces
 from quadcurv.comparison import compare
-from quadcurv.quality import quality
+from quadcurv.mesh_quality import quality
 from quadcurv.viewing import FIELDS, Fields
 from quadcurv.viewing.geometry import drawn, overlays, viewpoint
 from quadcurv.viewing.scale import BARS, ZERO_COLOUR

@@ -7,7 +7,7 @@ import pytest
 
 import quadcurv as qc
 from quadcurv import surfaces
-from quadcurv.convergence import fitted_rate
+from quadcurv.refinement import fitted_rate
 from quadcurv.schemes import SCHEMES, fundamental_forms
 
 SURFACES = ["torus", "ellipsoid", "tanh_sheet", "catenoid", "helicoid", "hyperboloid"]

@@ -10,7 +10,7 @@ from test_boundary import disc, l_shape, shuffled, square, without_unused
 
 import quadcurv as qc
 from quadcurv import drivers, surfaces
-from quadcurv.convergence import fitted_rate
+from quadcurv.refinement import fitted_rate
 from quadcurv.schemes import jet
 
 AXES = np.array([2.0, 1.5, 1.0])  # of the ellipsoids

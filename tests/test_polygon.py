@@ -8,7 +8,7 @@ import pytest
 
 import quadcurv as qc
 from quadcurv import surfaces
-from quadcurv.convergence import fitted_rate
+from quadcurv.refinement import fitted_rate
 from quadcurv.schemes import alexa_wardetzky, bunge, de_goes
 
 POLYGON = ["bunge", "de_goes", "alexa_wardetzky"]

@@ -16,7 +16,7 @@ from PIL import Image
 
 from quadcurv import surfaces, viewing
 from quadcurv.comparison import compare
-from quadcurv.convergence import convergence
+from quadcurv.refinement import convergence
 from quadcurv.viewing import opengl
 from quadcurv.viewing.scale import ZERO_COLOUR
 

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from quadcurv import drivers
 from quadcurv.comparison import Comparison
-from quadcurv.quality import quality
+from quadcurv.mesh_quality import quality
 from quadcurv.schemes import Curvatures, jet
 from quadcurv.types import Floats, Ints, MeshError
 from quadcurv.viewing.geometry import Drawn, drawn, overlays

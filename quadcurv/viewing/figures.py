@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 from numpy.typing import ArrayLike
 
 from quadcurv.comparison import NORMS
-from quadcurv.convergence import Convergence, fitted_rate
+from quadcurv.refinement import Convergence, fitted_rate
 from quadcurv.types import Floats
 
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")

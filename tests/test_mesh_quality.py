@@ -17,8 +17,8 @@ from quadcurv import (
     read,
     surfaces,
 )
-from quadcurv.convergence import fitted_rate
-from quadcurv.quality import quality, summary
+from quadcurv.mesh_quality import quality, summary
+from quadcurv.refinement import fitted_rate
 
 LAPLACIANS = [name for name, scheme in SCHEMES.items() if isinstance(scheme, Laplacian)]
 CUBE = np.array([(x, y, z) for x in (0, 1) for y in (0, 1) for z in (0, 1)], float)
