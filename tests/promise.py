@@ -1,0 +1,381 @@
+"""Meshes with exact curvature, damaged as people's meshes are, and what a scheme says of them.
+
+A case is a surface, a damage, a scheme, a size, a scale, a turn and an offset, all drawn from a seed. Of
+every finite value the error must be within
+    10 E + explained
+
+where E is the largest error that the scheme has on the undamaged mesh, and `explained` is what the damage
+accounts for, vertex by vertex (see each damage); or the value is NaN; or a warning was given; or the mesh was
+refused, with an error that says why. Run as a program it tries as many cases as asked for:
+
+    python -m tests.promise 100000
+"""
+
+from __future__ import annotations
+
+import sys
+import warnings
+from collections import Counter
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cache
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+import quadcurv as qc
+from quadcurv import surfaces
+from quadcurv.schemes import SCHEMES
+from quadcurv.stencils import grid_faces
+
+SURFACES = (
+    "torus",
+    "dupin_cyclide",
+    "ellipsoid",
+    "catenoid",
+    "hyperboloid",
+    "elliptic_paraboloid",
+    "enneper",
+    "tanh_sheet",
+)
+LOCAL = 5.0  # times the largest principal curvature: what vertices of a damaged face may be off by
+
+
+@dataclass
+class Sample:
+    """A grid on a surface: parameters (r, c), positions (r, c, 3), exact H (r, c), and which way it wraps."""
+
+    surface: surfaces.Surface
+    xi: np.ndarray
+    eta: np.ndarray
+
+    @property
+    def points(self):
+        return self.surface.mapping(self.xi, self.eta)
+
+    @property
+    def H(self):  # noqa: N802
+        return self.surface.mean_curvature(self.xi, self.eta)
+
+    @property
+    def faces(self):
+        index = np.arange(self.xi.size).reshape(self.xi.shape)
+        return grid_faces(np.pad(index, [(0, int(w)) for w in self.surface.wrap], mode="wrap"))
+
+    @property
+    def bend(self):
+        """Largest principal curvature."""
+        k1, k2 = self.surface.principal_curvatures(self.xi, self.eta)
+        return float(max(np.abs(k1).max(), np.abs(k2).max()))
+
+    @property
+    def edge(self):
+        x = self.points
+        return float(max(np.linalg.norm(np.diff(x, axis=a), axis=-1).max() for a in (0, 1)))
+
+
+@dataclass
+class Damaged:
+    """What a damage makes: positions, a mesh of them, exact H at its vertices, what is explained."""
+
+    points: np.ndarray
+    mesh: Callable[[np.ndarray], object]
+    H: np.ndarray
+    explained: np.ndarray | float = 0.0
+
+
+@cache
+def sample(name: str, n: int) -> Sample:
+    surface = surfaces.SURFACES[name]()
+    _, xi, eta = surface.sample((n, n))
+    return Sample(surface, xi, eta)
+
+
+@cache
+def undamaged_error(name: str, n: int, scheme: str) -> float:
+    s = sample(name, n)
+    H = qc.mean_curvature(qc.QuadGrid(s.points, s.surface.wrap), scheme)
+    return float(np.nanmax(np.abs(H - s.H)))
+
+
+def near(faces, vertices, size, reach=1):
+    """Mask of the vertices within `reach` faces of some."""
+    mask = np.zeros(size, bool)
+    mask[vertices] = True
+    for _ in range(reach):
+        for face in faces:
+            if mask[list(face)].any():
+                mask[list(face)] = True
+    return mask
+
+
+def steps(t):
+    """Spacing of parameters around each, at least on one side."""
+    return np.abs(np.gradient(t))
+
+
+def jitter(s, rng):
+    """Vertices moved within the surface by 5 to 20 % of the spacing: Laplacians are off by that part of k."""
+    part = rng.choice([0.05, 0.1, 0.2])
+    moved = Sample(
+        s.surface,
+        s.xi + part * rng.uniform(-1, 1, s.xi.shape) * np.abs(s.xi[1, 0] - s.xi[0, 0]),
+        s.eta + part * rng.uniform(-1, 1, s.xi.shape) * np.abs(s.eta[0, 1] - s.eta[0, 0]),
+    )
+    return Damaged(
+        moved.points, lambda x: qc.QuadGrid(x, s.surface.wrap), moved.H, explained=20 * part * s.bend
+    )
+
+
+def noise(s, rng):
+    """Positions off the surface by noise of 1e-4 to 1e-2 edges: H is off by some 10 noise / edge^2."""
+    size = rng.choice([1e-4, 1e-3, 1e-2]) * s.edge
+    x = s.points + rng.normal(0, size, s.points.shape)
+    least = min(np.linalg.norm(np.diff(s.points, axis=a), axis=-1).min() for a in (0, 1))
+    return Damaged(x, lambda x: qc.QuadGrid(x, s.surface.wrap), s.H, explained=40 * size / least**2)
+
+
+def uneven_border(s, rng):
+    """First cells 0.3 to 2 times as wide as the others: an error of first order where the spacing jumps."""
+    ratio, axis = rng.uniform(0.3, 2), rng.integers(2)
+    if s.surface.wrap[axis]:
+        axis = 1 - axis
+    t = [s.xi[:, 0].copy(), s.eta[0].copy()]
+    step = t[axis][1] - t[axis][0]
+    t[axis][0] = t[axis][1] - ratio * step
+    if rng.random() < 0.5:
+        t[axis] = -t[axis][::-1] if not s.surface.wrap[axis] else t[axis]
+    moved = Sample(s.surface, *np.meshgrid(*t, indexing="ij"))
+    return Damaged(
+        moved.points,
+        lambda x: qc.QuadGrid(x, s.surface.wrap),
+        moved.H,
+        explained=5 * s.bend**2 * s.edge,
+    )
+
+
+def faces_of(s):
+    return [list(map(int, f)) for f in s.faces]
+
+
+def inner_face(s, rng):
+    """A face away from borders, and where it stands."""
+    r, c = s.xi.shape
+    i, j = rng.integers(4, r - 5), rng.integers(4, c - 5)
+    corners = [i * c + j, (i + 1) * c + j, (i + 1) * c + j + 1, i * c + j + 1]
+    faces = faces_of(s)
+    return faces, next(k for k, f in enumerate(faces) if set(f) == set(corners)), (i, j)
+
+
+def with_vertex(s, rng, where):
+    """A quad cut into triangles about a further vertex at a place (u, v) within it, 0 to 1."""
+    faces, k, (i, j) = inner_face(s, rng)
+    u, v = where
+    xi = s.xi[i, j] + u * (s.xi[i + 1, j] - s.xi[i, j])
+    eta = s.eta[i, j] + v * (s.eta[i, j + 1] - s.eta[i, j])
+    new = s.xi.size
+    quad = faces.pop(k)
+    faces += [[quad[m], quad[(m + 1) % 4], new] for m in range(4)]
+    points = np.vstack((s.points.reshape(-1, 3), s.surface.mapping(xi, eta)))
+    H = np.append(s.H.ravel(), s.surface.mean_curvature(xi, eta))
+    explained = np.where(near(faces, [*quad, new], H.size, 2), LOCAL * s.bend, 0.0)
+    return Damaged(points, lambda x: qc.QuadMesh(x, faces), H, explained)
+
+
+def needle(s, rng):
+    """A vertex 1e-12 to 1e-2 of an edge beside another one: its neighbours are off by as much as k."""
+    d = 10.0 ** rng.uniform(-12, -2)
+    return with_vertex(s, rng, (d, d))
+
+
+def cap(s, rng):
+    """A vertex 1e-12 to 1e-2 of an edge beside an edge."""
+    return with_vertex(s, rng, (rng.uniform(0.3, 0.7), 10.0 ** rng.uniform(-12, -2)))
+
+
+def hanging_node(s, rng):
+    """A vertex in the middle of an edge, in one of its two faces: it lies on the chord, off the surface."""
+    faces, k, _ = inner_face(s, rng)
+    a, b = faces[k][:2]
+    new = s.xi.size
+    faces[k].insert(1, new)
+    flat = s.points.reshape(-1, 3)
+    points = np.vstack((flat, (flat[a] + flat[b]) / 2))
+    H = np.append(s.H.ravel(), (s.H.ravel()[a] + s.H.ravel()[b]) / 2)
+    explained = np.where(near(faces, [*faces[k]], H.size, 2), LOCAL * s.bend, 0.0)
+    return Damaged(points, lambda x: qc.QuadMesh(x, faces), H, explained)
+
+
+def collapsed(s, rng):
+    """A quad given with a vertex twice, in place of a triangle: the same as the triangle."""
+    faces, k, _ = inner_face(s, rng)
+    a, b, c, d = faces[k]
+    faces[k] = [a, b, c, c]
+    faces.append([a, c, d, d])
+    explained = np.where(near(faces, [a, b, c, d], s.xi.size, 2), LOCAL * s.bend, 0.0)
+    return Damaged(s.points.reshape(-1, 3), lambda x: qc.QuadMesh(x, faces), s.H.ravel(), explained)
+
+
+def turned(s, rng):
+    """Some faces turned over."""
+    faces = faces_of(s)
+    for k in rng.choice(len(faces), rng.integers(1, 9), replace=False):
+        faces[k] = faces[k][::-1]
+    return Damaged(s.points.reshape(-1, 3), lambda x: qc.QuadMesh(x, faces), s.H.ravel())
+
+
+def doubled(s, rng):
+    """Some faces given twice."""
+    faces = faces_of(s)
+    faces += [faces[k] for k in rng.choice(len(faces), rng.integers(1, 9), replace=False)]
+    return Damaged(s.points.reshape(-1, 3), lambda x: qc.QuadMesh(x, faces), s.H.ravel())
+
+
+def fin(s, rng):
+    """A quad standing on an edge: NaN at its ends, nothing elsewhere but for fewer neighbours."""
+    faces, k, _ = inner_face(s, rng)
+    a, b = faces[k][:2]
+    n = s.xi.size
+    flat = s.points.reshape(-1, 3)
+    up = np.cross(flat[faces[k][2]] - flat[a], flat[faces[k][3]] - flat[b])
+    up *= s.edge / np.linalg.norm(up)
+    points = np.vstack((flat, flat[[a, b]] + up))
+    faces.append([b, a, n, n + 1])
+    H = np.append(s.H.ravel(), [np.nan, np.nan])  # of the fin's own vertices there is no exact H
+    explained = np.where(near(faces, [a, b], n + 2, 2), 0.2 * s.bend, 0.0)
+    return Damaged(points, lambda x: qc.QuadMesh(x, faces), H, explained)
+
+
+def hole(s, rng):
+    """Holes in a grid, masked or NaN: borders."""
+    points, hidden = s.points, np.zeros(s.xi.shape, bool)
+    r, c = hidden.shape
+    for _ in range(rng.integers(1, 3)):
+        i, j = rng.integers(0, r - 2), rng.integers(0, c - 2)
+        hidden[i : i + rng.integers(1, 4), j : j + rng.integers(1, 4)] = True
+    given = points.copy()
+    given[hidden] = np.nan
+    explained = np.where(near(faces_of(s), np.flatnonzero(hidden), hidden.size, 2), 0.2 * s.bend, 0.0)
+    return Damaged(
+        given,
+        lambda x: qc.QuadGrid(x, s.surface.wrap, mask=hidden if rng.random() < 0.5 else None),
+        s.H,
+        explained.reshape(hidden.shape),
+    )
+
+
+def single_precision(s, rng):
+    """Positions in single precision: eps |x| / h^2."""
+    least = min(np.linalg.norm(np.diff(s.points, axis=a), axis=-1).min() for a in (0, 1))
+    explained = 4 * np.finfo(np.float32).eps * np.abs(s.points).max() / least**2
+    return Damaged(
+        s.points, lambda x: qc.QuadGrid(x.astype(np.float32), s.surface.wrap), s.H, explained=explained
+    )
+
+
+def far_away(s, rng):
+    """A mesh far from the origin: eps |x| / h^2."""
+    offset = 10.0 ** rng.uniform(3, 9)
+    least = min(np.linalg.norm(np.diff(s.points, axis=a), axis=-1).min() for a in (0, 1))
+    return Damaged(
+        s.points + offset,
+        lambda x: qc.QuadGrid(x, s.surface.wrap),
+        s.H,
+        explained=4 * np.finfo(float).eps * offset / least**2,
+    )
+
+
+def repeated_row(s, rng):
+    """A wrap whose first row is given once more at the end."""
+    axis = int(np.argmax(s.surface.wrap)) if any(s.surface.wrap) else rng.integers(2)
+    wrap = tuple(w or i == axis for i, w in enumerate(s.surface.wrap))
+    x = np.concatenate((s.points, s.points.take([0], axis)), axis)
+    return Damaged(x, lambda x: qc.QuadGrid(x, wrap), np.full(x.shape[:2], np.nan))
+
+
+def pole(s, rng):
+    """A sphere to its poles, rows of one point but for rounding: right beside the pole, there to 20 %."""
+    n = s.xi.shape[0]
+    p, t = np.meshgrid(
+        np.linspace(0, np.pi, n), np.linspace(0, 2 * np.pi, 2 * n, endpoint=False), indexing="ij"
+    )
+    x = np.stack((np.sin(p) * np.cos(t), np.sin(p) * np.sin(t), np.cos(p)), axis=-1)
+    wrap = (False, True)
+    H = np.ones(p.shape)
+    if rng.random() < 0.5:
+        x, wrap, H = x.swapaxes(0, 1)[::-1], (True, False), H.T
+    explained = np.full(H.shape, 0.2)
+    return Damaged(x, lambda x: qc.QuadGrid(x, wrap), H, explained)
+
+
+DAMAGES = (
+    jitter,
+    noise,
+    uneven_border,
+    needle,
+    cap,
+    hanging_node,
+    collapsed,
+    turned,
+    doubled,
+    fin,
+    hole,
+    single_precision,
+    far_away,
+    repeated_row,
+    pole,
+)
+
+
+def verdict(seed: int) -> tuple[str, str]:
+    """How a case ended ("right", "NaN", "warned", "refused", "wrong", "changed"), and what it was."""
+    rng = np.random.default_rng(seed)
+    name, n = str(rng.choice(SURFACES)), int(rng.choice([14, 20]))
+    damage, scheme = DAMAGES[rng.integers(len(DAMAGES))], str(rng.choice(list(SCHEMES)))
+    s = sample(name, n)
+    damaged = damage(s, rng)
+    scale = 10.0 ** rng.integers(-6, 7)
+    plain = damage in (far_away, single_precision)
+    turn = np.eye(3) if plain else Rotation.random(rng=rng).as_matrix()
+    points = scale * (damaged.points @ turn.T)
+    what = f"{seed}: {scheme} on {name} {n}, {damage.__name__}, scale {scale:g}"
+    before = points.copy()
+    with warnings.catch_warnings(record=True) as said:
+        warnings.simplefilter("always")
+        try:
+            H = qc.mean_curvature(damaged.mesh(points), scheme)
+        except qc.MeshError as error:
+            return "refused", f"{what}: {error}"
+    if not np.array_equal(points, before, equal_nan=True):
+        return "changed", what
+    error = np.abs(H * scale - damaged.H)
+    allowed = 10 * undamaged_error(name, n, scheme) + damaged.explained + 1e-9
+    wrong = np.isfinite(error) & (error > allowed)
+    if not wrong.any():
+        return ("right" if np.isfinite(H).mean() > 0.5 else "NaN"), what
+    if said and damage not in (turned, doubled):
+        return "warned", what
+    at = np.unravel_index(np.argmax(np.where(wrong, error - allowed, 0)), error.shape)
+    return "wrong", (
+        f"{what}: {np.count_nonzero(wrong)} wrong, at {tuple(map(int, at))} off by {error[at]:.3g}, "
+        f"allowed {np.broadcast_to(allowed, error.shape)[at]:.3g}"
+    )
+
+
+def main(count: int, start: int = 0) -> None:
+    """Print how many cases ended how, and those that must not be."""
+    ends, bad = Counter(), []
+    for seed in range(start, start + count):
+        try:
+            end, what = verdict(seed)
+        except Exception as error:  # what must not be
+            end, what = "crashed", f"{seed}: {type(error).__name__}: {error}"
+        ends[end] += 1
+        if end in ("wrong", "changed", "crashed"):
+            bad.append(what)
+    print(*bad, sep="\n")
+    print(dict(ends))
+
+
+if __name__ == "__main__":
+    main(*map(int, sys.argv[1:]))

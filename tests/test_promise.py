@@ -1,0 +1,45 @@
+"""No number is wrong in silence: surfaces, damages and schemes, see `tests/promise.py`."""
+
+from __future__ import annotations
+
+from collections import Counter
+from dataclasses import replace
+
+import pytest
+
+from quadcurv.schemes import SCHEMES
+from tests import promise
+
+
+def ends(seeds):
+    found = [promise.verdict(seed) for seed in seeds]
+    bad = [what for end, what in found if end in ("wrong", "changed")]
+    assert not bad, "\n".join(bad)
+    return Counter(end for end, _ in found)
+
+
+def test_nothing_is_wrong_in_silence():
+    assert ends(range(200))["right"] > 120
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("part", range(10))
+def test_nothing_is_wrong_in_silence_in_many_cases(part):
+    assert ends(range(1000 + 200 * part, 1200 + 200 * part))["right"] > 120
+
+
+def test_a_wrong_number_would_be_seen(monkeypatch):
+    """With finite volumes twice too large most of its cases are wrong."""
+    right = SCHEMES["finite_volume"]
+    cases = [seed for seed in range(200) if "finite_volume on" in promise.verdict(seed)[1]]
+    promise.undamaged_error.cache_clear()
+    before = {
+        (name, n): promise.undamaged_error(name, n, "finite_volume")
+        for name in promise.SURFACES
+        for n in (14, 20)
+    }
+    twice = replace(right, fast=None, flux=lambda s: (2 * right.flux(s)[0], right.flux(s)[1]))
+    monkeypatch.setitem(SCHEMES, "finite_volume", twice)
+    monkeypatch.setattr(promise, "undamaged_error", lambda name, n, scheme: before[name, n])
+    found = Counter(promise.verdict(seed)[0] for seed in cases)
+    assert found["wrong"] >= len(cases) // 3
