@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import json
+import logging
 import os
 import re
 import subprocess
@@ -17,6 +18,8 @@ import trimesh
 
 import quadcurv
 from quadcurv import cli, surfaces
+from quadcurv.cli import commands
+from quadcurv.cli.values import VALUES
 from quadcurv.comparison import compare
 from quadcurv.viewing import opengl_problem
 
@@ -71,7 +74,9 @@ def test_compare_of_chosen_schemes_as_json(ball, capsys, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     assert run("compare", ball, "-s", "liu", "--scheme", "cotan-6", "--json") == 0
     out, error = capsys.readouterr()
-    assert json.loads(out) == compare(ball, ["liu", "cotan-6"]).to_dict()
+    found = json.loads(out)
+    assert found.pop("mesh") == "nothing mended"
+    assert found == compare(ball, ["liu", "cotan-6"]).to_dict()
     assert error == ""
     assert [p.name for p in tmp_path.iterdir()] == ["ball.obj"]  # scripts get no pictures
 
@@ -110,17 +115,20 @@ def test_counts_of_a_mesh_are_printed(tmp_path, capsys):
     assert run("curvature", path, "-o", tmp_path / "out.csv", "-s", "jet-2") == 0
     out = capsys.readouterr().out.splitlines()
     with pytest.warns(quadcurv.MeshWarning, match="turned"):
-        valence = quadcurv.read(path).stencils().valence
+        mesh = quadcurv.read(path)
+    valence = mesh.stencils().valence
+    assert "1 face(s) turned" in str(mesh.report)
     H = [row["mean_curvature"] for row in table(tmp_path / "out.csv")]
     assert out == [
+        f"QuadMesh(10 points, 2 quads, 4 triangles): {mesh.report}",
         "faces: 2 quads, 4 triangles (1 larger polygon(s) cut into such); 1 turned",
         "vertices: 10, 1 of them where another one is",
         "valence: " + ", ".join(f"{v} ({(valence == v).sum()})" for v in np.unique(valence)),
         "rings: 1 interior, 0 extrapolated, 9 open",
-        f"undefined: {H.count('nan')} by jet-2",
+        f"undefined: {H.count('nan')} of mean_curvature",
     ]
     assert run("compare", path, "-s", "liu", "--output", tmp_path) == 0
-    assert capsys.readouterr().out.splitlines()[:4] == out[:4]
+    assert capsys.readouterr().out.splitlines()[:5] == out[:5]
 
 
 def test_curvature_as_csv(ball, tmp_path):
@@ -129,8 +137,8 @@ def test_curvature_as_csv(ball, tmp_path):
     rows = table(tmp_path / "out.csv")
     for columns, expected in (
         (["x", "y", "z"], mesh.points),
-        (["Normals_x", "Normals_y", "Normals_z"], quadcurv.vertex_normals(mesh)),
-        (["mean_curvature"], quadcurv.mean_curvature(mesh, "finite_volume")[:, None]),
+        (["normal_x", "normal_y", "normal_z"], quadcurv.curvatures(mesh).normal),
+        (["mean_curvature"], quadcurv.mean_curvature(mesh, "jet")[:, None]),
         (["valence"], mesh.stencils().valence[:, None]),
     ):
         assert np.array_equal([[float(row[c]) for c in columns] for row in rows], expected)
@@ -150,39 +158,17 @@ def test_view_as_a_picture(ball, tmp_path):
     assert run("view", ball, "-s", "liu", "-s", "jet", "--png", tmp_path / "map.png") == 0
     with Image.open(tmp_path / "map.png") as image:
         assert image.width > image.height > 300
+    style = ["--size", "640", "480", "--camera", "0", "0", "1", "--range", "0", "2", "--colours", "magma"]
+    arguments = ["view", ball, *style, "--title", "Ball", "--shading", "-s", "liu", "--png"]
+    assert run(*arguments, tmp_path / "styled.png") == 0
+    with Image.open(tmp_path / "styled.png") as image:
+        assert image.size == (640, 480)
 
 
 def test_view_without_a_display(ball, capsys, monkeypatch):
     monkeypatch.setattr(sys, "platform", "linux")
     monkeypatch.delenv("DISPLAY", raising=False)
     assert "--html FILE writes a page instead" in refusal(capsys, "view", ball, "-s", "liu")
-
-
-def test_reproduce_passes_options_on_and_the_exit_code_back(monkeypatch, tmp_path):
-    (tmp_path / "comparisons").mkdir()
-    for name, code in (
-        ("__init__", ""),
-        ("chapter1", "import sys; print(*sys.argv[1:])"),
-        ("other", "exit(3)"),
-    ):
-        (tmp_path / "comparisons" / f"{name}.py").write_text(code)
-    monkeypatch.setattr(cli, "_COMPARISONS", tmp_path / "comparisons")
-    called = []
-    real = subprocess.run
-
-    def spy(command, **options):
-        called.append(command)
-        return real(command, **options)
-
-    monkeypatch.setattr(subprocess, "run", spy)
-    assert run("reproduce", "--quick", "--output", tmp_path) == 0
-    assert called == [[sys.executable, "-m", "comparisons.chapter1", "--quick", "--output", str(tmp_path)]]
-    assert run("reproduce", "other") == 3
-
-
-def test_reproduce_knows_the_chapters():
-    known = {p.stem for p in cli._COMPARISONS.glob("chapter*.py")}
-    assert "chapter4" in known
 
 
 @pytest.mark.parametrize(
@@ -192,21 +178,45 @@ def test_reproduce_knows_the_chapters():
         (["compare", "nosuch.obj"], r"nosuch\.obj: No such file or directory"),
         (["compare", "{folder}"], "Is a directory"),
         (["compare", "{ball}", "-s", "mean"], "scheme: expected one of finite_volume, liu, .*, got 'mean'"),
-        (["compare", "{ball}", "-s", "liu", "-s", "liu"], "schemes: expected at least one, each once"),
+        (["compare", "{ball}", "-s", "liu", "-s", "liu"], "--scheme: expected each once, got liu, liu"),
         (["compare", "{ball}", "--colour"], "Unknown option"),
         (["compare", "{broken}"], r"broken\.obj: line 1: 'v a b c' is not OBJ"),
         (["compare", "{far}"], "faces: .*out of range|far.obj"),
         (["compare", "notes.txt"], r"notes\.txt: cannot read \.txt"),
         (["curvature", "{ball}"], "--output"),
         (["curvature", "{ball}", "-o", "out.xyz"], r"cannot write \.xyz"),
-        (["curvature", "{ball}", "-o", "{folder}/no/out.csv"], "No such file or directory"),
+        (["curvature", "{ball}", "-o", "{folder}/no/out.csv"], "--output: there is no folder .*no$"),
         (["view", "klein_bottle", "--html", "page.html"], "neither a file nor a surface, .*torus"),
         (
             ["view", "torus", "--field", "colour", "--html", "page.html"],
             "field: expected one of mean_curvature",
         ),
-        (["view", "torus", "--png", "page.html.jpg"], r"expected a name ending in \.png or \.html"),
-        (["reproduce", "chapter9"], "expected any of .*chapter4.*, got 'chapter9'"),
+        (["view", "torus", "--png", "page.html.jpg"], r"--png: cannot write \.jpg; there are \.png"),
+        (["view", "torus", "--merge", "--html", "page.html"], "a surface is sampled; --merge"),
+        (["compare", "{scene}", "--no-join"], "a scene of 2 shapes, which --join joins"),
+        (["compare", "{ball}", "--wrap", "rows"], "wrap: only a StructuredGrid has directions to wrap"),
+        # What is wrong with an option is said before a file is opened.
+        (["compare", "nosuch.obj", "--merge", "-1"], "--merge: expected a length, got -1"),
+        (["compare", "nosuch.obj", "--merge", "nan"], "--merge: expected a length, got nan"),
+        (["compare", "nosuch.obj", "--boundary", "mirror"], "mirror.*boundary.*extrapolate"),
+        (["compare", "nosuch.obj", "--camera", "0", "0", "0"], "camera: expected a direction"),
+        (["compare", "nosuch.obj", "--camera", "1", "0"], "--camera"),
+        (["compare", "nosuch.obj", "--size", "20", "20"], "size: expected whole numbers of pixels"),
+        (["compare", "nosuch.obj", "--colours", "plaid"], "colours: matplotlib has no map .plaid"),
+        (["compare", "nosuch.obj", "--csv", "{folder}"], "--csv: .* is a folder"),
+        (["compare", "nosuch.obj", "-o", "notes.txt"], "--output: notes.txt is no folder"),
+        (["compare", "nosuch.obj", "-s", "mean"], "scheme: expected one of"),
+        (
+            ["curvature", "nosuch.obj", "-o", "out.obj"],
+            r"--output: cannot write \.obj; there are \.csv, .*\.ply",
+        ),
+        (["curvature", "nosuch.obj", "-o", "out.ply", "-v", "torsion"], "value.*torsion"),
+        (
+            ["view", "nosuch.obj", "--html", "a.html", "--field", "difference to liu", "-s", "jet"],
+            "field: .*",
+        ),
+        (["view", "nosuch.obj", "--html", "a.html", "--range", "2", "1"], "limits: expected low < high"),
+        (["view", "nosuch.obj", "--html", "a.html", "--title", "a\nb"], "title: expected one line"),
         (["render"], "Unknown command"),
     ],
 )
@@ -215,15 +225,162 @@ def test_refusals_take_one_line(arguments, message, ball, tmp_path, capsys, monk
     (tmp_path / "broken.obj").write_text("v a b c\n")
     (tmp_path / "far.obj").write_text("v 0 0 0\nv 1 0 0\nv 1 1 0\nf 1 2 9\n")
     (tmp_path / "notes.txt").touch()
-    paths = {"ball": ball, "folder": tmp_path, "broken": tmp_path / "broken.obj", "far": tmp_path / "far.obj"}
+    trimesh.Scene([trimesh.creation.box(), trimesh.creation.icosphere()]).export(tmp_path / "scene.glb")
+    paths = {
+        "scene": tmp_path / "scene.glb",
+        "ball": ball,
+        "folder": tmp_path,
+        "broken": tmp_path / "broken.obj",
+        "far": tmp_path / "far.obj",
+    }
     line = refusal(capsys, *(a.format(**paths) for a in arguments))
     assert re.search(message, line), line
     assert "Traceback" not in line
 
 
-def test_an_installed_package_without_scripts_says_so(capsys, monkeypatch, tmp_path):
-    monkeypatch.setattr(cli, "_COMPARISONS", tmp_path / "comparisons")
-    assert "not part of the installed package" in refusal(capsys, "reproduce")
+@pytest.fixture
+def tube(tmp_path):
+    """File of a tube whose vertices come once a cell, and the number of places they lie at."""
+    grid = surfaces.cylinder().sample((8, 24))[0]
+    mesh = grid.to_mesh()
+    soup = mesh.points[mesh.faces].reshape(-1, 3)
+    cells = np.insert(np.arange(len(soup)).reshape(-1, 4), 0, 4, axis=1)
+    path = tmp_path / "tube.vtu"
+    pyvista.UnstructuredGrid(cells.ravel(), np.full(len(cells), 9, np.uint8), soup).save(path)
+    return path, len(mesh.points)
+
+
+@pytest.mark.parametrize("merge", [[], ["--merge"], ["--merge", "1e-6"]])
+def test_seams_are_merged_and_told_of(tube, merge, capsys):
+    path, n = tube
+    assert run("compare", *merge, path, "-s", "liu", "--json") == 0
+    out, error = capsys.readouterr()
+    assert json.loads(out)["vertices"] == n
+    assert json.loads(out)["undefined"] == {"liu": 0}
+    assert re.match(r"quadcurv: \d+ vertices merged with others at the same place, to (1|6.3)e-06", error)
+    assert ("--no-merge keeps them apart" in error) == (not merge)
+    assert error.count("\n") == 1
+
+
+def test_seams_that_are_to_stay(tube, capsys):
+    path, n = tube
+    assert run("compare", path, "--no-merge", "-s", "liu", "--json") == 0
+    found = json.loads(capsys.readouterr().out)
+    assert found["vertices"] == found["undefined"]["liu"] > 3 * n
+
+
+def test_values_go_to_the_vertices_of_the_file(tube, tmp_path):
+    path, _ = tube
+    assert run("curvature", path, "-o", tmp_path / "out.csv", "-s", "liu", "-v", "mean_curvature") == 0
+    rows = table(tmp_path / "out.csv")
+    assert list(rows[0]) == ["x", "y", "z", "mean_curvature"]
+    points = pyvista.read(path).points
+    assert np.array_equal([[float(row[c]) for c in "xyz"] for row in rows], points)
+    assert [float(row["mean_curvature"]) for row in rows] == pytest.approx([0.5] * len(points), abs=0.01)
+
+
+def test_merge_takes_a_length(tmp_path, capsys):
+    """Two squares, a gap of 0.01 between them."""
+    path = tmp_path / "gap.off"
+    corners = [(x, y, 0) for x, y in ((0, 0), (1, 0), (1, 1), (0, 1), (1.01, 0), (2, 0), (2, 1), (1.01, 1))]
+    rows = [(8, 2, 0), *corners, (4, 0, 1, 2, 3), (4, 4, 5, 6, 7)]
+    path.write_text("OFF\n" + "\n".join(" ".join(map(str, row)) for row in rows))
+    for merge, n in ((["--merge", "0.02"], 6), (["--merge"], 8), ([], 8)):
+        assert run("compare", path, *merge, "-s", "jet", "--json") == 0
+        assert json.loads(capsys.readouterr().out)["vertices"] == n
+
+
+def test_scenes_are_joined(tmp_path, capsys):
+    box, ball = trimesh.creation.box(), trimesh.creation.icosphere()
+    scene = trimesh.Scene([box, ball])
+    scene.add_geometry(box, transform=trimesh.transformations.translation_matrix([9, 0, 0]))
+    scene.export(tmp_path / "scene.glb")
+    assert run("compare", tmp_path / "scene.glb", "-s", "liu", "--json") == 0
+    out, error = capsys.readouterr()
+    assert json.loads(out)["vertices"] == 2 * len(box.vertices) + len(ball.vertices)
+    assert "scene.glb: 3 shapes joined" in error
+    assert run("curvature", tmp_path / "scene.glb", "--join", "-o", tmp_path / "out.csv") == 0
+    assert max(float(row["x"]) for row in table(tmp_path / "out.csv")) == pytest.approx(9.5)
+
+
+def test_grids_are_closed_where_they_meet(tmp_path, capsys):
+    grid = surfaces.cylinder().sample((8, 24))[0]
+    quadcurv.to_pyvista(grid).save(tmp_path / "tube.vts")
+    closed = "rows" if grid.wrap[0] else "columns"
+    for wrap, said in (([], "closed there; --no-merge keeps it open"), (["--wrap", closed], "")):
+        assert run("curvature", tmp_path / "tube.vts", *wrap, "-o", tmp_path / "out.csv", "-s", "liu") == 0
+        out, error = capsys.readouterr()
+        assert said in error
+        assert "wrap=(" in out.splitlines()[0]
+        rows = table(tmp_path / "out.csv")
+        assert [float(row["mean_curvature"]) for row in rows] == pytest.approx([0.5] * len(rows), abs=0.01)
+    assert (
+        run("compare", tmp_path / "tube.vts", "--no-merge", "--boundary", "nan", "-s", "liu", "--json") == 0
+    )
+    assert json.loads(capsys.readouterr().out)["undefined"]["liu"] == 2 * (9 + 24) - 2
+
+
+def test_closed_parts_are_oriented(tmp_path, capsys):
+    mesh = surfaces.cubed_sphere().sample((6, 6), "faces")[0]
+    path = tmp_path / "inside_out.obj"
+    quadcurv.write(path, quadcurv.QuadMesh(mesh.points, mesh.faces[:, ::-1]))
+    for options, sign in (([], -1), (["--orient"], 1)):
+        assert run("curvature", path, *options, "-o", tmp_path / "out.vtp", "-s", "liu") == 0
+        H = quadcurv.read_values(tmp_path / "out.vtp")["mean_curvature"]
+        assert (sign * H > 0.9).all()
+        assert ("inside out" in capsys.readouterr().out) == (sign < 0)
+
+
+def test_all_values_are_written_and_read_back(ball, tmp_path):
+    assert run("curvature", ball, "-o", tmp_path / "out.vtp") == 0
+    found, mesh = quadcurv.read_values(tmp_path / "out.vtp"), quadcurv.read(ball)
+    assert set(found) == set(VALUES)
+    fit = quadcurv.curvatures(mesh)
+    for name, expected in (
+        ("mean_curvature", fit.mean),
+        ("gaussian_curvature", fit.gaussian),
+        ("k1", fit.k1),
+        ("direction2", fit.direction2),
+        ("error_gaussian_curvature", fit.standard_error.gaussian),
+        ("normal", fit.normal),
+    ):
+        assert np.array_equal(found[name], expected)
+    assert found["shape_index"] == pytest.approx(1, abs=0.05)
+    assert found["curvedness"] == pytest.approx(1, abs=0.05)
+
+
+@pytest.mark.parametrize(
+    ("k1", "k2", "index", "curvedness"),
+    [(2, 2, 1, 2), (1, 0, 0.5, 0.5**0.5), (3, -3, 0, 3), (0, -1, -0.5, 0.5**0.5), (-1, -1, -1, 1)],
+)
+def test_shape_index_and_curvedness(k1, k2, index, curvedness):
+    of_one = [np.array([0.0])] * 2 + [np.array([float(k)]) for k in (k1, k2)] + [np.zeros((1, 3))] * 3
+    found = quadcurv.Curvatures(*of_one)
+    assert found.shape_index == pytest.approx([index])
+    assert found.curvedness == pytest.approx([curvedness])
+    flat = quadcurv.Curvatures(*[np.zeros(1)] * 4, *[np.zeros((1, 3))] * 3)
+    assert np.isnan(flat.shape_index[0])
+    assert flat.curvedness == [0]
+
+
+def test_what_the_package_logs_is_said(ball, capsys, monkeypatch):
+    def slow(*arguments):
+        logging.getLogger("quadcurv.kernels").info("compiling for the first time")
+        return real(*arguments)
+
+    real = commands.load
+    monkeypatch.setattr(commands, "load", slow)
+    assert run("compare", ball, "-s", "liu", "--json") == 0
+    assert capsys.readouterr().err == "quadcurv: compiling for the first time\n"
+    assert not logging.getLogger("quadcurv").handlers
+
+
+def test_a_large_page_says_so_first(ball, tmp_path, capsys, monkeypatch):
+    monkeypatch.setattr("quadcurv.viewing.page.LIMIT", 100_000)
+    assert run("view", ball, "--html", tmp_path / "page.html") == 0
+    said = capsys.readouterr().err.splitlines()
+    assert said[0].startswith("quadcurv: warning: a page with all fields of 218 vertices")
+    assert said[-1] == f"quadcurv: {tmp_path / 'page.html'}"
 
 
 def test_warnings_take_one_line(shared_meshes, capsys):
@@ -233,7 +390,7 @@ def test_warnings_take_one_line(shared_meshes, capsys):
     assert error.count("\n") == 1
 
 
-@pytest.mark.parametrize("command", [[], ["compare"], ["curvature"], ["view"], ["reproduce"]])
+@pytest.mark.parametrize("command", [[], ["compare"], ["curvature"], ["view"]])
 def test_help_has_examples(command, capsys):
     assert run(*command, "--help") == 0
     out = capsys.readouterr().out
@@ -249,7 +406,7 @@ def test_version(capsys):
 
 def test_completion_names_the_commands():
     script = cli.app.generate_completion(shell="bash")
-    assert all(name in script for name in ("compare", "curvature", "view", "reproduce", "--scheme"))
+    assert all(name in script for name in ("compare", "curvature", "view", "--scheme", "--merge"))
 
 
 def test_as_a_program_without_opengl(ball, tmp_path):

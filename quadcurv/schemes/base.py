@@ -6,6 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Literal, NamedTuple, Protocol
 
+import numpy as np
 import scipy
 
 from quadcurv.stencils import Stencils
@@ -104,6 +105,21 @@ class Curvatures:
     noise: Floats | None = None
     degree: Ints | None = None
     rings: Ints | None = None
+
+    @property
+    def shape_index(self) -> Floats:
+        """2 / pi arctan((k1 + k2) / (k1 - k2)): 1 on spheres seen from outside, 0 at symmetric saddles.
+
+        0.5 on ridges, -0.5 in ruts, -1 in cups; NaN where the surface is flat (Koenderink and van Doorn 1992,
+        with the sign of H here).
+        """
+        index = 2 / np.pi * np.arctan2(self.k1 + self.k2, self.k1 - self.k2)
+        return np.where((self.k1 == 0) & (self.k2 == 0), np.nan, index)
+
+    @property
+    def curvedness(self) -> Floats:
+        """((k1^2 + k2^2) / 2)^(1/2) in 1 / length (Koenderink and van Doorn 1992)."""
+        return np.hypot(self.k1, self.k2) / np.sqrt(2)
 
 
 class Neighbourhoods(Protocol):
