@@ -2,6 +2,7 @@
 
 A case is a surface, a damage, a scheme, a size, a scale, a turn and an offset, all drawn from a seed. Of
 every finite value the error must be within
+
     10 E + explained
 
 where E is the largest error that the scheme has on the undamaged mesh, and `explained` is what the damage
