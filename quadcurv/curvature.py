@@ -408,7 +408,10 @@ def laplace_beltrami(mesh: Any, f: ArrayLike, scheme: SchemeName | Scheme = DEFA
     """
     mesh, chosen = as_mesh(mesh), _as_laplacian(scheme)
     stencils = mesh.stencils()
-    given = np.asarray(f, np.float64)
+    given = np.asarray(f)
+    if given.dtype.kind not in "biuf":
+        raise ValueError(f"f: expected real numbers, got dtype {given.dtype}")
+    given = given.astype(np.float64, copy=False)
     if drivers.has_holes(mesh):
         if given.shape[:2] != mesh.shape:
             raise ValueError(f"f: shape {given.shape}, expected {mesh.shape} or {(*mesh.shape, 'k')}")

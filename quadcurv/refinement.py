@@ -283,7 +283,8 @@ def convergence(
 
     Examples
     --------
-    >>> run = convergence("torus", "liu", [16, 32, 64])
+    >>> import quadcurv as qc
+    >>> run = qc.convergence("torus", "liu", [16, 32, 64])
     >>> run.rates("liu", "inf").round(1)
     array([2., 2.])
     """

@@ -38,7 +38,7 @@ def run(
 ) -> dict[str, Floats]:
     """Results by name (see `direct.PER_VERTEX`), into the arrays of `out` where there are any."""
     checked_boundary(boundary)
-    results = _arrays(mesh, wanted, out or {})
+    results = _arrays(mesh, wanted, {} if out is None else out)
     if has_holes(mesh):
         for name, values in run(mesh.to_mesh(), scheme, results, boundary).items():
             results[name][...] = mesh.in_shape(values)
@@ -75,6 +75,8 @@ def has_holes(mesh: Mesh) -> TypeGuard[QuadGrid]:
 
 def _arrays(mesh: Mesh, wanted: Iterable[str], out: Mapping[str, Floats]) -> dict[str, Floats]:
     """The caller's arrays, which kernels will write to without looking again, or new ones."""
+    if not isinstance(out, Mapping):
+        raise ValueError(f"out: expected a mapping from names to arrays, got {type(out).__name__}")
     shape = (len(mesh.points),) if isinstance(mesh, QuadMesh) else mesh.shape
     results: dict[str, Floats] = {}
     for name in dict.fromkeys((*wanted, *out)):
