@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import os
 import sys
 import warnings
@@ -55,7 +56,8 @@ class Format:
     suffixes : tuple of str
         In lower case, with their dot.
     read : callable or None
-        Path -> Content; MeshError where the file is no such file.
+        Path -> Content, or a list of them where a file holds several parts. MeshError where it is no
+        such file.
     write : callable or None
         (path, mesh, values) into a new file.
     holds_values : bool
@@ -63,7 +65,7 @@ class Format:
     """
 
     suffixes: tuple[str, ...]
-    read: Callable[[Path], Content] | None = None
+    read: Callable[[Path], Content | list[Content]] | None = None
     write: Callable[[Path, QuadMesh, Values], None] | None = None
     holds_values: bool = False
 
@@ -80,11 +82,14 @@ class Library:
         Its mesh -> Content; TypeError for what is no mesh.
     attach : callable or None
         (mesh, name, values, colormap): see :func:`quadcurv.attach`.
+    takes : callable or None
+        Whether an object of other modules has what it takes; asked where no module fits.
     """
 
     modules: tuple[str, ...]
     content: Callable[[Any], Content]
     attach: Callable[[Any, str, NDArray[Any], str | None], None] | None = None
+    takes: Callable[[Any], bool] | None = None
 
 
 FORMATS: dict[str, Format] = {}
@@ -100,9 +105,10 @@ def register(entry: Format | Library) -> None:
 
 
 def library(mesh: Any) -> Library | None:
-    """The library that a mesh or the class it inherits from stems from, without importing any."""
+    """The library that a mesh or the class it inherits from stems from, or is like, without importing any."""
     roots = {base.__module__.partition(".")[0] for base in type(mesh).__mro__}
-    return next((entry for name, entry in LIBRARIES.items() if name in roots), None)
+    known = next((entry for name, entry in LIBRARIES.items() if name in roots), None)
+    return known or next((e for e in LIBRARIES.values() if e.takes is not None and e.takes(mesh)), None)
 
 
 def is_a(mesh: Any, *names: str) -> bool:
@@ -138,7 +144,38 @@ def polygons(sizes: Sequence[int] | NDArray[Any], vertices: Sequence[int] | NDAr
         table = np.full((len(sizes), 4), -1, np.int64)
         table[np.arange(4) < sizes[:, None]] = vertices
         return table
-    return [face.tolist() for face in np.split(vertices, ends[:-1])]
+    flat, cuts = vertices.tolist(), [0, *ends.tolist()]
+    return [flat[begin:end] for begin, end in itertools.pairwise(cuts)]
+
+
+def joined(parts: Sequence[Content]) -> Content:
+    """Parts of a scene as one; of the values those that all of them have."""
+    if len(parts) == 1:
+        return parts[0]
+    if any(part.faces is None for part in parts):
+        raise MeshError("mesh: grids cannot be joined")
+    first = np.cumsum([0, *(len(part.points) for part in parts)])
+    tables = [np.asarray(p.faces) for p in parts if isinstance(p.faces, np.ndarray)]
+    faces: Any
+    if len(tables) == len(parts):
+        tables = [np.insert(t, 3, -1, axis=1) if t.shape[1] == 3 else t for t in tables]
+        faces = np.concatenate([np.where(t < 0, -1, t + n) for t, n in zip(tables, first, strict=False)])
+    else:
+        faces = [
+            [v + n for v in face if v >= 0]
+            for p, n in zip(parts, first.tolist(), strict=False)
+            for face in p.faces
+        ]
+    values = {}
+    for name in parts[0].values:
+        arrays = [part.values[name] for part in parts if name in part.values]
+        if len(arrays) == len(parts) and len({array.shape[1:] for array in arrays}) == 1:
+            values[name] = np.concatenate(arrays)
+    pairings = [part.pairing for part in parts if part.pairing is not None]
+    rules = sorted({rule for rule, _ in pairings})
+    pairing = (", ".join(rules), sum(count for _, count in pairings)) if pairings else None
+    notes = tuple(note for part in parts for note in part.notes)
+    return Content(np.concatenate([part.points for part in parts]), faces, values, pairing, notes)
 
 
 class FaceList(NamedTuple):
@@ -206,17 +243,29 @@ def checked_values(name: str, values: NDArray[Any], shape: tuple[int, ...]) -> N
     return values
 
 
-def warn(message: str) -> None:
-    """A MeshWarning that names the line of the user's that led here."""
+def colours(values: NDArray[Any], colormap: str = "viridis") -> NDArray[np.uint8]:
+    """RGBA of scalars over the range from their 2nd to their 98th percentile; grey where not finite."""
+    from matplotlib import colormaps
+
+    if colormap not in colormaps:
+        raise ValueError(f"colormap: matplotlib has no {colormap!r}")
+    finite = np.isfinite(values)
+    rgba = np.full((len(values), 4), (128, 128, 128, 255), np.uint8)
+    if finite.any():
+        known = values[finite].astype(float)
+        low, high = np.percentile(known, (2, 98))
+        if not low < high:  # all but a few are equal
+            low, high = known.min(), known.max()
+        with np.errstate(over="ignore"):
+            rgba[finite] = colormaps[colormap](
+                np.clip((known - low) / ((high - low) or 1.0), 0, 1), bytes=True
+            )
+    return rgba
+
+
+def warn(message: str, kind: type[MeshWarning] = MeshWarning) -> None:
+    """A warning that names the line of the user's that led here."""
     package, level, frame = os.path.dirname(os.path.dirname(__file__)), 1, sys._getframe(0)
     while frame.f_back is not None and frame.f_code.co_filename.startswith(package):
         frame, level = frame.f_back, level + 1
-    warnings.warn(message, MeshWarning, stacklevel=level)
-
-
-def foreign(reader: Callable[..., Any], path: Path, **options: Any) -> Any:
-    """What another library's reader, which may raise anything, makes of a file."""
-    try:
-        return reader(path, **options)
-    except Exception as error:
-        raise MeshError(f"{type(error).__name__}: {error}") from error
+    warnings.warn(message, kind, stacklevel=level)

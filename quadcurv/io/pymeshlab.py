@@ -18,9 +18,20 @@ from quadcurv.types import MeshError
 def content(mesh: Any) -> Content:
     """Polygons of a Mesh, or of a MeshSet's current one, where its transformation puts them."""
     mesh = _current_mesh(mesh)
+    points, triangles = mesh.transformed_vertex_matrix(), mesh.face_matrix()
+    if _has_edges_of_many_faces(triangles):
+        # polygonal_face_list() would walk around these for ever.
+        note = "more than two triangles share an edge, so that MeshLab cannot tell which make polygons"
+        return Content(points, triangles, notes=(note,))
     faces = mesh.polygonal_face_list()
     corners = np.concatenate(faces) if len(faces) else ()
-    return Content(mesh.transformed_vertex_matrix(), polygons([len(f) for f in faces], corners))
+    return Content(points, polygons([len(f) for f in faces], corners))
+
+
+def _has_edges_of_many_faces(triangles: NDArray[np.integer]) -> bool:
+    one, other = triangles.astype(np.int64), np.roll(triangles, -1, axis=1).astype(np.int64)
+    edges = np.sort((np.minimum(one, other) << 32 | np.maximum(one, other)).ravel())
+    return bool((edges[2:] == edges[:-2]).any())
 
 
 def _current_mesh(mesh: Any) -> Any:

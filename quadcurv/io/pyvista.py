@@ -7,32 +7,36 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from quadcurv.io.base import Content, FaceList, Library, checked_values, is_a, polygons, register
+from quadcurv.io.base import Content, FaceList, Library, checked_values, is_a, register
+from quadcurv.io.vtk import dataset
 from quadcurv.mesh import QuadMesh
 from quadcurv.types import Floats, MeshError
 
-TRIANGLE, POLYGON, PIXEL, QUAD = 5, 7, 8, 9
 
-
-def content(dataset: Any) -> Content:
+def content(data: Any) -> Content:
     """Polygons of a PolyData or UnstructuredGrid, or the one layer of a StructuredGrid."""
-    dataset = wrapped(dataset)
-    values = {name: np.asarray(dataset.point_data[name]) for name in dataset.point_data.keys()}  # noqa: SIM118
-    points = np.asarray(dataset.points)
-    if is_a(dataset, "StructuredGrid"):
-        shape = dataset.dimensions
-        if sum(size == 1 for size in shape) != 1:
-            raise MeshError(f"mesh: a StructuredGrid of dimensions {tuple(shape)}, expected one layer")
-        axis = shape.index(1)
-        values = {name: _by_row(array, shape, axis) for name, array in values.items()}
-        return Content(_by_row(points, shape, axis), None, values)
-    if is_a(dataset, "PolyData"):
-        if dataset.n_strips:
-            raise MeshError(f"mesh: {dataset.n_strips} triangle strip(s); triangulate() makes them faces")
-        sizes, corners = _sizes_and_corners(dataset.GetPolys())
+    data = wrapped(data)
+    meta: dict[str, Any] = {"kind": type(data).__name__}
+    arrays = {"points": np.asarray(data.points)}
+    if is_a(data, "StructuredGrid"):
+        meta["dimensions"] = data.dimensions
+    elif is_a(data, "PolyData"):
+        # pyvista makes a vertex cell of every point of a PolyData without faces.
+        meta |= {"strips": data.n_strips, "left_out": data.n_lines + data.n_verts}
+        _add_cells(arrays, data.GetPolys())
     else:
-        sizes, corners = _polygon_cells(dataset)
-    return Content(points, polygons(sizes, corners), values)
+        arrays["types"] = np.asarray(data.celltypes)
+        _add_cells(arrays, data.GetCells())
+    for name in data.point_data.keys():  # noqa: SIM118
+        arrays[f"value {name}"] = np.asarray(data.point_data[name])
+    return dataset(meta, arrays)
+
+
+def _add_cells(arrays: dict[str, NDArray[Any]], cells: Any) -> None:
+    from pyvista import convert_array
+
+    arrays["offsets"] = np.array(convert_array(cells.GetOffsetsArray()), np.int64)
+    arrays["corners"] = np.array(convert_array(cells.GetConnectivityArray()), np.int64)
 
 
 def wrapped(dataset: Any) -> Any:
@@ -47,37 +51,6 @@ def wrapped(dataset: Any) -> Any:
             "extract_surface() or combine() may give one"
         )
     return dataset
-
-
-def _by_row(array: NDArray[Any], shape: tuple[int, int, int], axis: int) -> NDArray[Any]:
-    """Entries (n, ...), which VTK numbers with the first index fastest, as (r, c, ...)."""
-    given = array.reshape(*shape[::-1], *array.shape[1:])
-    return np.moveaxis(given, (2, 1, 0), (0, 1, 2)).squeeze(axis=axis)
-
-
-def _sizes_and_corners(cells: Any) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    from pyvista import convert_array
-
-    offsets, corners = (
-        np.array(convert_array(array), np.int64)
-        for array in (cells.GetOffsetsArray(), cells.GetConnectivityArray())
-    )
-    return np.diff(offsets), corners
-
-
-def _polygon_cells(dataset: Any) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Sizes and corners of an UnstructuredGrid of triangles, quads, pixels and polygons."""
-    types = np.asarray(dataset.celltypes)
-    if (other := ~np.isin(types, (TRIANGLE, POLYGON, PIXEL, QUAD))).any():
-        first = int(np.argmax(other))
-        raise MeshError(
-            f"mesh: {np.count_nonzero(other)} cells are no polygons, first cell {first} of VTK type "
-            f"{types[first]}; extract_surface() takes the outside of volumes"
-        )
-    sizes, corners = _sizes_and_corners(dataset.GetCells())
-    third = (np.cumsum(sizes) - 2)[types == PIXEL]
-    corners[third], corners[third + 1] = corners[third + 1], corners[third]
-    return sizes, corners
 
 
 def from_mesh(mesh: QuadMesh) -> Any:

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from quadcurv.io.base import Content, Library, checked_values, is_a, register
+from quadcurv.io.base import Content, Library, checked_values, colours, is_a, register
 from quadcurv.io.quads import quads_by_carrier, quads_by_order, split_quads
 from quadcurv.mesh import QuadMesh
 from quadcurv.types import MeshError
@@ -86,29 +86,14 @@ def attach(mesh: Any, name: str, values: NDArray[Any], colormap: str | None) -> 
     values = checked_values(name, values, (len(mesh.vertices),))
     mesh.vertex_attributes[name] = values.copy()
     if colormap is not None and values.ndim == 1:
-        from trimesh.visual import ColorVisuals
-
-        mesh.visual = ColorVisuals(mesh, vertex_colors=colours(values, colormap))
+        show(mesh, values, colormap)
 
 
-def colours(values: NDArray[Any], colormap: str) -> NDArray[np.uint8]:
-    """RGBA of scalars over the range from their 2nd to their 98th percentile; grey where not finite."""
-    from matplotlib import colormaps
+def show(mesh: Any, values: NDArray[Any], colormap: str) -> None:
+    """Colours of scalars as the visual of a Trimesh."""
+    from trimesh.visual import ColorVisuals
 
-    if colormap not in colormaps:
-        raise ValueError(f"colormap: matplotlib has no {colormap!r}")
-    finite = np.isfinite(values)
-    rgba = np.full((len(values), 4), (128, 128, 128, 255), np.uint8)
-    if finite.any():
-        known = values[finite].astype(float)
-        low, high = np.percentile(known, (2, 98))
-        if not low < high:  # all but a few are equal
-            low, high = known.min(), known.max()
-        with np.errstate(over="ignore"):
-            rgba[finite] = colormaps[colormap](
-                np.clip((known - low) / ((high - low) or 1.0), 0, 1), bytes=True
-            )
-    return rgba
+    mesh.visual = ColorVisuals(mesh, vertex_colors=colours(values, colormap))
 
 
 register(Library(("trimesh",), content, attach))
