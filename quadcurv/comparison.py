@@ -24,7 +24,7 @@ from quadcurv.mesh import Mesh
 from quadcurv.precision import warn_of_rounding
 from quadcurv.schemes import SCHEMES, Fit, Scheme, as_scheme
 from quadcurv.stencils import Stencils
-from quadcurv.tables import by_column, finite, progress, short, text_tables, write_csv
+from quadcurv.tables import as_html, by_column, finite, progress, short, text_tables, write_csv
 from quadcurv.types import Bools, Floats, Ints
 
 NORMS = ("one", "two", "inf", "one-area", "two-area")
@@ -228,6 +228,9 @@ class Comparison:
         yield from self.tables()
         for name, reason in self.notes.items():
             yield Text(f"{name}: {reason}")
+
+    def _repr_html_(self) -> str:
+        return as_html(self)
 
 
 def _median(values: Floats, weights: Floats) -> Floats:

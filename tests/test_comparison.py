@@ -162,6 +162,15 @@ def test_names_are_no_markup():
     assert "[bold]" in text
 
 
+def test_a_notebook_shows_the_tables():
+    result = by_hand(**{"<b>": [1, 2, 3, 4], "liu": [1, 2, 3, 5]})
+    shown = result._repr_html_()
+    assert shown.startswith("<pre")
+    assert "&lt;b&gt;" in shown
+    assert "<b>" not in shown
+    assert "Mean difference" in shown
+
+
 def test_a_comparison_is_one_line():
     mesh = surfaces.cubed_sphere().sample((4, 4), "faces")[0]
     assert repr(compare(mesh)) == (
