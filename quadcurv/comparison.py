@@ -18,13 +18,13 @@ from rich.text import Text
 from quadcurv import drivers
 from quadcurv.boundary import checked_boundary, one_rings
 from quadcurv.curvature import dual_areas
-from quadcurv.drivers import direct
+from quadcurv.drivers import direct, fits
 from quadcurv.io import as_mesh
 from quadcurv.mesh import Mesh
 from quadcurv.precision import warn_of_rounding
 from quadcurv.schemes import SCHEMES, Fit, Scheme, as_scheme
 from quadcurv.stencils import Stencils
-from quadcurv.tables import by_column, finite, progress, short, text_tables, write_csv
+from quadcurv.tables import as_html, by_column, finite, progress, short, text_tables, write_csv
 from quadcurv.types import Bools, Floats, Ints
 
 NORMS = ("one", "two", "inf", "one-area", "two-area")
@@ -229,6 +229,9 @@ class Comparison:
         for name, reason in self.notes.items():
             yield Text(f"{name}: {reason}")
 
+    def _repr_html_(self) -> str:
+        return as_html(self)
+
 
 def _median(values: Floats, weights: Floats) -> Floats:
     """Weighted median along the first axis, the mean of two where they share the middle; NaN weighs 0."""
@@ -296,26 +299,36 @@ def compare(
 
 
 class Evaluation:
-    """A mesh and what schemes share on it: its stencils, made once."""
+    """A mesh and what schemes share on it, made once: its stencils and neighbourhoods.
+
+    A grid with holes is computed as a face list.
+    """
 
     def __init__(self, mesh: Mesh, boundary: str) -> None:
         self.mesh = mesh
         self.boundary = checked_boundary(boundary)
-        self.given = mesh.stencils()
+        self._whole: Mesh = mesh.to_mesh() if drivers.has_holes(mesh) else mesh
+        self.given = self._whole.stencils()
 
     @cached_property
     def closed(self) -> Stencils:
         """Stencils with their boundary closed."""
-        return one_rings(self.mesh, self.boundary)
+        return one_rings(self._whole, self.boundary)
+
+    @cached_property
+    def neighbourhoods(self) -> fits.MeshNeighbourhoods:
+        """What fits see."""
+        return fits.MeshNeighbourhoods(self._whole, self.boundary)
 
     def mean_curvature(self, scheme: Scheme) -> Floats:
         """H in the shape of results."""
         if isinstance(scheme, Fit):
-            return drivers.fit(self.mesh, scheme, self.boundary).mean
-        if scheme.fast is not None:
-            return drivers.run(self.mesh, scheme, ["mean_curvature"], self.boundary)["mean_curvature"]
-        H = np.empty(self.given.shape)
-        direct.evaluate(self.given, self.closed, scheme, {"mean_curvature": H})
+            H = fits.fit_around(self.neighbourhoods, scheme).mean
+        elif scheme.fast is not None:
+            H = drivers.run(self._whole, scheme, ["mean_curvature"], self.boundary)["mean_curvature"]
+        else:
+            H = np.empty(self.given.shape)
+            direct.evaluate(self.given, self.closed, scheme, {"mean_curvature": H})
         return self.mesh.in_shape(H.ravel())
 
 

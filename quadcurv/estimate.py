@@ -15,7 +15,7 @@ from quadcurv.types import Floats
 
 def disagreement(
     mesh: Any,
-    scheme: str | Scheme = "finite_volume",
+    scheme: str | Scheme,
     reference: str | Scheme = "jet",
     boundary: str = "extrapolate",
 ) -> Floats:
@@ -48,7 +48,7 @@ def disagreement(
 
 def richardson(
     grid: QuadGrid,
-    scheme: str | Scheme = "finite_volume",
+    scheme: str | Scheme,
     order: float | None = None,
     boundary: str = "extrapolate",
 ) -> Floats:
@@ -88,7 +88,7 @@ def richardson(
     if not isinstance(grid, QuadGrid):
         raise ValueError(f"grid: expected a QuadGrid, got {type(grid).__name__}")
     p = scheme.order if order is None else order
-    if not p > 0:
+    if not isinstance(p, float | int | np.number) or not 0 < p < np.inf:
         raise ValueError(f"order: expected a positive number, got {p!r} ({scheme.name})")
     for size, wraps, name in zip(grid.shape, grid.wrap, ("rows", "columns"), strict=True):
         if size % 2 == wraps:
@@ -96,8 +96,9 @@ def richardson(
             raise ValueError(
                 f"grid: {size} {name} that {kind}, an {need} number is needed to take every second"
             )
+    mask = None if grid.mask is None else grid.mask[::2, ::2]
     fine = mean_curvature(grid, scheme, boundary)
-    coarse = mean_curvature(QuadGrid(grid.points[::2, ::2], grid.wrap), scheme, boundary)
+    coarse = mean_curvature(QuadGrid(grid.points[::2, ::2], grid.wrap, mask), scheme, boundary)
     estimate = (coarse - fine[::2, ::2]) / (2**p - 1)
     for axis, wraps in enumerate(grid.wrap):
         following = np.roll(estimate, -1, axis)
@@ -106,4 +107,4 @@ def richardson(
         estimate = between.reshape(*estimate.shape[:axis], -1, *estimate.shape[axis + 1 :]).take(
             range(size), axis
         )
-    return estimate
+    return np.where(np.isnan(fine), np.nan, estimate)

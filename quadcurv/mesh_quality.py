@@ -90,7 +90,8 @@ def summary(mesh: Any, schemes: Iterable[str] | None = None, boundary: str = "ex
     """
     mesh = as_mesh(mesh)
     stencils = mesh.stencils()
-    treatment = boundary_treatment(mesh, boundary)
+    present = mesh.in_shape(np.ones(stencils.n, bool))  # but the holes of a grid
+    treatment = boundary_treatment(mesh, boundary)[present]
     triangles = int(np.count_nonzero(stencils.faces[:, 3] < 0))
     return {
         "vertices": stencils.n,
@@ -105,7 +106,7 @@ def summary(mesh: Any, schemes: Iterable[str] | None = None, boundary: str = "ex
             for name, code in (("interior", INTERIOR), ("extrapolated", EXTRAPOLATED), ("open", OPEN))
         },
         "undefined": {
-            name: int(np.count_nonzero(np.isnan(_mean_curvature(mesh, as_scheme(name), boundary))))
+            name: int(np.count_nonzero(np.isnan(_mean_curvature(mesh, as_scheme(name), boundary)[present])))
             for name in (SCHEMES if schemes is None else schemes)
         },
     }

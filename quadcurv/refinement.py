@@ -17,7 +17,7 @@ from quadcurv.comparison import NORMS, Evaluation, norms, schemes_of
 from quadcurv.curvature import dual_areas, gaussian_curvature, principal_curvatures
 from quadcurv.schemes import Scheme
 from quadcurv.surfaces import SURFACES, Surface
-from quadcurv.tables import by_column, finite, progress, short, text_table, write_csv
+from quadcurv.tables import as_html, by_column, finite, progress, short, text_table, write_csv
 from quadcurv.types import Floats, Ints
 
 Quantity = Literal["mean_curvature", "gaussian_curvature", "k1", "k2"]
@@ -248,6 +248,9 @@ class Convergence:
         yield self.table("one")
         yield self.table("one-area")
         yield self.table("inf")
+
+    def _repr_html_(self) -> str:
+        return as_html(self)
 
 
 def convergence(

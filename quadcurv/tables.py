@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import io
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, TypeVar
@@ -70,6 +71,14 @@ def text_tables(title: str, columns: Sequence[str], rows: Sequence[Sequence[str]
         tables.append(text_table(title, part[0], part[1:]))
         start = end
     return tables
+
+
+def as_html(*tables: Any) -> str:
+    """What a console would show, for a notebook: text in one width, no markup but its own."""
+    console = Console(record=True, width=WIDTH, file=io.StringIO(), force_jupyter=False)
+    console.print(*tables)
+    block = '<pre style="line-height: 1.2; white-space: pre">{code}</pre>'
+    return console.export_html(code_format=block, inline_styles=True)
 
 
 def short(value: float) -> str:

@@ -77,6 +77,7 @@ def test_convergence_table_csv_and_dict(tmp_path):
     rows = list(csv.DictReader((tmp_path / "run.csv").read_text().splitlines()))
     assert len(rows) == 2 * 3 * len(NORMS)
     assert float(rows[1]["error"]) == run.errors["finite_volume"]["one"][1]
+    assert "inf-norm of the error in H" in run._repr_html_()
     as_dict = json.loads(json.dumps(run.to_dict(), allow_nan=False))
     assert as_dict["schemes"]["cotan-6"]["undefined"] == [0, 0, 0]
 

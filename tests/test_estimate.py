@@ -53,7 +53,7 @@ def test_disagreement_ranks_errors_on_jittered_grids(jitter):
     )
     grid = qc.QuadGrid(surface.mapping(xi, eta), (True, True))
     error = qc.mean_curvature(grid, "finite_volume") - surface.mean_curvature(xi, eta)
-    correlation, found = ranked(disagreement(grid), error)
+    correlation, found = ranked(disagreement(grid, "finite_volume"), error)
     assert correlation > 0.97
     assert found > 0.9
 
@@ -79,7 +79,7 @@ def test_richardson_correction_raises_the_order():
     errors = []
     for n in (32, 64, 128):
         grid, xi, eta = surface.sample((n, n))
-        H = qc.mean_curvature(grid, "finite_volume") - richardson(grid)
+        H = qc.mean_curvature(grid, "finite_volume") - richardson(grid, "finite_volume")
         errors.append(np.abs(H - surface.mean_curvature(xi, eta))[::2, ::2].max())
     assert errors[-1] < 1e-4
     assert fitted_rate((32, 64, 128), errors) > 3.7
@@ -92,14 +92,14 @@ def test_estimates_have_the_shape_and_place_of_the_grid(wrap):
     points = np.concatenate((grid.points, grid.points[:1]))[:, :] if wrap[1] else grid.points
     if wrap[0]:
         points = np.concatenate((points, points[:, :1]), axis=1)
-    estimate = richardson(qc.QuadGrid(points, wrap))
+    estimate = richardson(qc.QuadGrid(points, wrap), "finite_volume")
     assert estimate.shape == points.shape[:2]
     assert estimate[3, 4] == pytest.approx((estimate[2, 4] + estimate[4, 4]) / 2, abs=1e-15)
     assert estimate[6, 5] == pytest.approx((estimate[6, 4] + estimate[6, 6]) / 2, abs=1e-15)
     last = (-1, 4) if wrap[0] else (4, -1)
     first, second = ((0, 4), (-2, 4)) if wrap[0] else ((4, 0), (4, -2))
     assert estimate[last] == pytest.approx((estimate[first] + estimate[second]) / 2, abs=1e-15)
-    assert np.isnan(richardson(qc.QuadGrid(points, wrap), boundary="nan")).any()
+    assert np.isnan(richardson(qc.QuadGrid(points, wrap), "finite_volume", boundary="nan")).any()
 
 
 def test_noise_is_estimated_by_the_automatic_fit():
@@ -108,8 +108,8 @@ def test_noise_is_estimated_by_the_automatic_fit():
     noise = np.random.default_rng(3).normal(0, 0.002, grid.points.shape)
     noisy = qc.QuadGrid(grid.points + noise, grid.wrap)
     error = qc.mean_curvature(noisy, "finite_volume") - surface.mean_curvature(xi, eta)
-    assert ranked(disagreement(noisy, reference=jet("auto")), error)[0] > 0.98
-    assert ranked(disagreement(noisy, reference="liu"), error)[0] < 0.5
+    assert ranked(disagreement(noisy, "finite_volume", jet("auto")), error)[0] > 0.98
+    assert ranked(disagreement(noisy, "finite_volume", "liu"), error)[0] < 0.5
 
 
 def test_rejections():
@@ -118,10 +118,26 @@ def test_rejections():
     with pytest.raises(ValueError, match="reference: expected another scheme than liu"):
         disagreement(grid, "liu", "liu")
     with pytest.raises(ValueError, match="9 rows that wrap, an even number is needed"):
-        richardson(grid)
+        richardson(grid, "liu")
     with pytest.raises(ValueError, match="10 columns that do not wrap, an odd number is needed"):
-        richardson(surfaces.plane().sample((8, 9))[0])
+        richardson(surfaces.plane().sample((8, 9))[0], "liu")
     with pytest.raises(ValueError, match="grid: expected a QuadGrid, got QuadMesh"):
-        richardson(grid.to_mesh())
+        richardson(grid.to_mesh(), "liu")
     with pytest.raises(ValueError, match=r"order: expected a positive number, got 0 \(cotan-8\)"):
         richardson(torus.sample((8, 8))[0], "cotan-8")
+    for order in ("2", np.nan, np.inf, -1):
+        with pytest.raises(ValueError, match="order: expected a positive number, got"):
+            richardson(torus.sample((8, 8))[0], "liu", order)
+
+
+def test_estimates_on_a_grid_with_holes():
+    grid = surfaces.torus().sample((24, 16))[0]
+    mask = np.zeros((24, 16), bool)
+    mask[3, 4] = mask[10:12, 5:9] = True
+    holed = qc.QuadGrid(grid.points, grid.wrap, mask=mask)
+    for estimate in (richardson(holed, "liu"), disagreement(holed, "liu")):
+        assert estimate.shape == (24, 16)
+        assert np.isnan(estimate[mask]).all()
+    whole = richardson(grid, "liu")
+    far = np.s_[16:22, 2:14]
+    assert richardson(holed, "liu")[far] == pytest.approx(whole[far], abs=1e-12)

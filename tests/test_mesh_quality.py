@@ -198,6 +198,16 @@ def test_summary_of_grids():
         summary(grid, ["nobody's"])
 
 
+def test_holes_of_a_grid_are_no_vertices():
+    grid = surfaces.torus().sample((12, 10))[0]
+    mask = np.zeros((12, 10), bool)
+    mask[3, 4] = mask[8, 7] = True
+    found = summary(QuadGrid(grid.points, grid.wrap, mask=mask), ["liu"], boundary="nan")
+    assert found["vertices"] == sum(found["valence"].values()) == sum(found["boundary"].values()) == 118
+    assert found["undefined"] == {"liu": 16}
+    assert found["boundary"]["open"] == 16
+
+
 def test_real_meshes(shared_meshes):
     counts = {
         "fish_control_mesh.obj": (112, 100, 20, 4),

@@ -205,3 +205,95 @@ def test_the_probe_runs_nothing_of_the_current_folder(tmp_path, monkeypatch):
 def test_a_probe_that_hangs_is_told_of(monkeypatch):
     monkeypatch.setattr(opengl, "_SECONDS", 0.01)
     assert opengl.opengl_problem.__wrapped__() == "OpenGL gives no picture within 0.01 seconds"
+
+
+def test_style_refuses_what_it_cannot_be():
+    for wrong, message in (
+        ({"camera": (0, 0, 0)}, r"camera: expected a direction, got \(0, 0, 0\)"),
+        ({"camera": (1, np.nan, 0)}, "camera: expected 3 finite numbers"),
+        ({"camera": "top"}, "camera: expected 3 finite numbers"),
+        ({"size": (99, 200)}, "size: expected whole numbers of pixels, at least 100"),
+        ({"size": (300.5, 200)}, "size: expected whole numbers of pixels, at least 100"),
+        ({"size": 300}, "size: expected 2 finite numbers"),
+        ({"limits": (2, 1)}, "limits: expected low < high"),
+        ({"limits": (0, np.inf)}, "limits: expected 2 finite numbers"),
+        ({"colours": "plaid"}, "colours: matplotlib has no map 'plaid'"),
+        ({"title": "a\nb"}, "title: expected one line"),
+    ):
+        with pytest.raises(ValueError, match=message):
+            viewing.Style(**wrong)
+
+
+def test_limits_are_checked_before_anything_is_drawn(ellipsoid):
+    with pytest.raises(ValueError, match="limits: expected 0 < low < high"):
+        viewing.maps(ellipsoid, "error", viewing.Style(limits=(-1, 1)))
+
+
+@needs_opengl
+def test_style_of_a_picture(ellipsoid, tmp_path):
+    style = {"size": (900, 500), "camera": (0, 0, 1)}
+    viewing.save_maps(ellipsoid, tmp_path / "plain.png", "error", viewing.Style(**style))
+    plain = pixels(tmp_path / "plain.png")
+    assert plain.shape == (500, 900, 3)
+    seen = (plain != 255).any(axis=2)
+    across, up = np.ptp(ellipsoid.mesh.points, axis=0)[:2]
+    columns, rows = (
+        np.flatnonzero(seen[60:380, :300].any(axis=0)),
+        np.flatnonzero(seen[60:380, :300].any(axis=1)),
+    )
+    assert np.ptp(columns) / np.ptp(rows) == pytest.approx(across / up, rel=0.03)  # from above, not squeezed
+    viewing.save_maps(
+        ellipsoid, tmp_path / "titled.png", "error", viewing.Style(title="Three operators", **style)
+    )
+    titled = pixels(tmp_path / "titled.png")
+    dark = (titled < 100).all(axis=2)
+    assert dark[:40, 300:600].sum() > 50  # above the middle view, as wide as the title
+    assert not (plain[:8] < 100).any()
+
+
+@needs_opengl
+def test_limits_colours_and_shading_of_the_first_field(ellipsoid):
+    style = viewing.Style(limits=(1e-3, 1.0), colours="magma", shading=True)
+    view = viewing.View(ellipsoid, "error", style, off_screen=True)
+    mapper = view.plotter.renderers[0].actors["surface"].mapper
+    assert mapper.scalar_range == (-3, 0)
+    bright = tuple(mapper.lookup_table.map_value(-0.01)[:3])
+    assert bright == pytest.approx(pyvista.LookupTable("magma", scalar_range=(-3, 0)).map_value(-0.01)[:3])
+    assert view.plotter.renderers[0].actors["surface"].prop.lighting
+    np.testing.assert_allclose(
+        10 ** mapper.dataset["values"], np.clip(np.abs(ellipsoid.errors["finite_volume"]), 1e-3, None)
+    )
+    view.show_field("mean_curvature")
+    low, high = view.plotter.renderers[0].actors["surface"].mapper.scalar_range
+    assert low == -high
+    view.plotter.close()
+
+
+@needs_opengl
+def test_a_mesh_is_shown_with_its_curvature():
+    mesh = surfaces.cubed_sphere().sample((6, 6), "faces")[0]
+    plotter = viewing.maps((mesh.points, mesh.faces), "mean_curvature")
+    shown = plotter.renderers[0].actors["surface"].mapper.dataset["values"]
+    assert shown == pytest.approx(1, abs=0.05)
+    plotter.close()
+
+
+@needs_opengl
+@pytest.mark.parametrize("decades", [None, (-5, -1)])
+def test_figure_of_several_surfaces(decades, tmp_path):
+    mesh = surfaces.torus().sample((12, 9), "staggered")[0]
+    panels = {"cells": (mesh, np.logspace(-6, 0, 108).reshape(12, 9)), "b": (mesh, np.full((12, 9), np.nan))}
+    figure = viewing.surfaces_figure(panels, "error", decades)
+    assert [axes.get_title() for axes in figure.axes[:2]] == ["cells", "b"]
+    assert len(figure.axes) == 2 + (decades is not None)
+    figure.savefig(tmp_path / "figure.png", dpi=100)
+    picture = pixels(tmp_path / "figure.png")
+    assert (picture == [0xB0] * 3).all(axis=2).mean() > (0.01 if decades else -1)
+
+
+def test_no_figure_of_surfaces_without_opengl(monkeypatch):
+    from quadcurv.viewing import panels
+
+    monkeypatch.setattr(panels, "opengl_problem", lambda: "no usable OpenGL")
+    with pytest.raises(viewing.NoOpenGLError, match="no usable OpenGL"):
+        viewing.surfaces_figure({})

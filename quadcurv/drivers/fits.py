@@ -29,7 +29,11 @@ _WORK = 30
 def fit(mesh: Mesh, scheme: Fit, boundary: str = "extrapolate") -> Curvatures:
     """Curvatures of a fit at every vertex of a mesh, in the shape of its results."""
     checked_boundary(boundary)
-    around = MeshNeighbourhoods(mesh, boundary)
+    return fit_around(MeshNeighbourhoods(mesh, boundary), scheme)
+
+
+def fit_around(around: MeshNeighbourhoods, scheme: Fit) -> Curvatures:
+    """The same over neighbourhoods that several fits may share."""
     found = scheme.fit(around)
     if found.mean.shape != around.wanted.shape:
         raise ValueError(

@@ -87,6 +87,8 @@ def _picture(
     points, faces, on_cells = drawn(mesh)
     surface = polydata(np.array(points), faces)
     style: dict[str, Any] = {"smooth_shading": True, **surface_style(shading=True)}
+    if not np.isfinite(values).any():
+        style["clim"] = 0, 1
     if decades is not None:
         values = np.log10(np.maximum(values, 10.0 ** decades[0]))
         style = {"clim": decades, **surface_style()}
