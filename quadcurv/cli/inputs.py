@@ -11,14 +11,12 @@ from numpy.typing import NDArray
 
 from quadcurv.cli.options import MeshOptions
 from quadcurv.cli.say import say
-from quadcurv.io.base import SAME_PLACE, foreign
+from quadcurv.io.base import SAME_PLACE
 from quadcurv.io.meshes import opened
 from quadcurv.io.seams import closed_grid
 from quadcurv.mesh import QuadGrid, QuadMesh
 from quadcurv.repair import duplicate_points, merge_points, orient
 from quadcurv.types import Indices, MeshError
-
-_SCENES = (".glb", ".gltf")
 
 
 @dataclass(frozen=True)
@@ -68,31 +66,12 @@ def load(path: Path, options: MeshOptions) -> Input:
 
 
 def _read(path: Path, options: MeshOptions) -> Any:
-    if path.suffix.lower() not in _SCENES:
-        return opened(path, wrap=options.wraps, seams=False)
-    import trimesh
-
-    path.open("rb").close()
-    scene = foreign(trimesh.load_scene, path, process=False)
-    nodes = [scene.graph[name] for name in scene.graph.nodes_geometry]
-    if len(nodes) < 2:
-        return opened(path, wrap=options.wraps, seams=False)
-    shapes = [
-        scene.geometry[name].copy().apply_transform(transform)
-        for transform, name in nodes
-        if hasattr(scene.geometry[name], "faces")
-    ]
-    if not options.join:
-        raise MeshError(f"{path}: a scene of {len(shapes)} shapes, which --join joins")
-    say(f"{path}: {len(shapes)} shapes joined")
-    return _joined([opened(shape, seams=False) for shape in shapes])
-
-
-def _joined(parts: list[Any]) -> QuadMesh:
-    """One face list of several, their vertices one after the other."""
-    first = np.cumsum([0, *(len(part.points) for part in parts)])
-    faces = [np.where(part.faces < 0, -1, part.faces + n) for part, n in zip(parts, first, strict=False)]
-    return QuadMesh(np.concatenate([part.points for part in parts]), np.concatenate(faces))
+    try:
+        return opened(path, wrap=options.wraps, seams=False, join=options.join)
+    except MeshError as error:
+        raise MeshError(
+            str(error).replace("join=True takes them as one", "--join takes them as one")
+        ) from None
 
 
 def _closed(mesh: Any, options: MeshOptions) -> tuple[Any, Indices | None]:

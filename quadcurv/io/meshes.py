@@ -75,13 +75,15 @@ def as_mesh(mesh: Any, quads: ArrayLike | None = None, wrap: Wrap | None = None)
     return opened(mesh, quads, wrap)
 
 
-def opened(mesh: Any, quads: Any = None, wrap: Wrap | None = None, seams: bool = True) -> Mesh:
-    """As as_mesh, without the warning of seams for who is about to close them."""
+def opened(
+    mesh: Any, quads: Any = None, wrap: Wrap | None = None, seams: bool = True, join: bool = False
+) -> Mesh:
+    """As as_mesh, or of a path as read, without the warning of seams for who is about to close them."""
     if isinstance(mesh, QuadMesh | QuadGrid | StaggeredGrid):
         _refuse(quads, wrap, type(mesh).__name__)
         return mesh
     if isinstance(mesh, str | os.PathLike):
-        return _read(mesh, quads, wrap, seams)
+        return _read(mesh, quads, wrap, seams, join)
     if isinstance(mesh, tuple) and len(mesh) == 2:
         _refuse(quads, wrap, "tuple")
         return QuadMesh(*mesh)
@@ -223,11 +225,11 @@ def read_values(path: str | os.PathLike[str]) -> dict[str, NDArray[Any]]:
 def _content(path: str | os.PathLike[str], join: bool = False) -> Content:
     path = Path(path)
     suffix = path.suffix.lower()
-    if suffix not in FORMATS or (reader := FORMATS[suffix].read) is None:
-        raise MeshError(f"cannot read {suffix or 'a file without suffix'}; {_known('read')} can be")
     if not stat.S_ISREG(path.stat().st_mode):
         path.open("rb").close()  # of a folder the system says it best
         raise MeshError("no regular file")
+    if suffix not in FORMATS or (reader := FORMATS[suffix].read) is None:
+        raise MeshError(f"cannot read {suffix or 'a file without suffix'}; {_known('read')} can be")
     path.open("rb").close()
     parts = reader(path)
     if isinstance(parts, Content):
