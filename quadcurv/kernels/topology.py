@@ -8,7 +8,8 @@ from functools import partial
 import numpy as np
 
 from quadcurv.kernels import ranges
-from quadcurv.kernels.compiled import helper, kernel, prefetch
+from quadcurv.kernels.compiled import helper, kernel
+from quadcurv.kernels.formulas import formula, prefetch
 
 ISOLATED, INTERIOR, BOUNDARY, SEVERAL_FANS, NONMANIFOLD = 0, 1, 2, 3, 4
 FAR = 10_000  # vertices between neighbours in memory, on average, that are in no cache
@@ -72,15 +73,21 @@ def mean_distance(faces):
     return total / max(count, 1)
 
 
+@formula
+def ask(values, index):
+    """Ask for the memory of an entry."""
+    prefetch(values, index)
+
+
 @kernel
-def first_corners(faces, far, ring, valence):
+def first_corners(faces, far, ring, ring8, valence):
     """Put the first four corners of every vertex into its row of `ring`, and count them as far as five."""
     for f in range(faces.shape[0]):
         if far and f + AHEAD < faces.shape[0]:
             for s in range(4):
                 v = max(faces[f + AHEAD, s], 0)
-                prefetch(ring, 8 * v)
-                prefetch(valence, v)
+                ask(ring8, 8 * v)
+                ask(valence, v)
         for s in range(4):
             v = faces[f, s]
             if v >= 0 and valence[v] < 5:
@@ -90,7 +97,7 @@ def first_corners(faces, far, ring, valence):
 
 
 @kernel
-def regular_rings(faces, far, valence, ring, start, stop):
+def regular_rings(faces, faces4, far, valence, ring, start, stop):
     """Rings (a, d, a, d, ...) of vertices start..stop inside four quads that run the same way round.
 
     Counter-clockwise from the first corner, eight vertices, where `first_corners` has put corners. A first
@@ -100,7 +107,7 @@ def regular_rings(faces, far, valence, ring, start, stop):
     for v in range(start, stop):
         if far and v + AHEAD < stop and valence[v + AHEAD] == 4:
             for k in range(4):
-                prefetch(faces, ring[v + AHEAD, k])
+                ask(faces4, ring[v + AHEAD, k])
         if valence[v] != 4:
             ring[v, 0] = -1
             continue
@@ -136,8 +143,8 @@ def regular_rings(faces, far, valence, ring, start, stop):
 def rings(faces, n):
     """Ring (n, 8) int32 of every vertex, see `regular_rings`."""
     ring, valence, far = np.empty((n, 8), np.int32), np.zeros(n, np.uint8), mean_distance(faces) > FAR
-    first_corners(faces, far, ring, valence)
-    ranges.over(partial(regular_rings, faces, far, valence, ring), n, n)
+    first_corners(faces, far, ring, ring.ravel(), valence)
+    ranges.over(partial(regular_rings, faces, faces.ravel(), far, valence, ring), n, n)
     return ring
 
 
