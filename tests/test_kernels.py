@@ -365,7 +365,7 @@ def test_inside_dask_workers():
     H = qc.mean_curvature(grid, "finite_volume")
     cluster = LocalCluster(2, threads_per_worker=2, processes=True, dashboard_address=None)
     with cluster, Client(cluster) as client:
-        tasks = [client.submit(qc.mean_curvature, grid, pure=False) for _ in range(8)]
+        tasks = [client.submit(qc.mean_curvature, grid, "finite_volume", pure=False) for _ in range(8)]
         for other in client.gather(tasks):
             np.testing.assert_array_equal(other, H)
 

@@ -62,6 +62,11 @@ class _Value:
     def __init__(self, value):
         self.value = value
 
+    __hash__ = None
+
+    def __bool__(self):
+        raise TypeError("a formula is written down before its values are known: use where, not if")
+
     @classmethod
     def of(cls, x):
         """What x is in the code, a constant where it is a number; None if it is of another kind."""
@@ -97,7 +102,10 @@ class Real(_Value):
     __add__, __sub__, __mul__, __truediv__ = map(_operator, ("fadd", "fsub", "fmul", "fdiv"))
     __radd__, __rsub__ = _operator("fadd", swapped=True), _operator("fsub", swapped=True)
     __rmul__, __rtruediv__ = _operator("fmul", swapped=True), _operator("fdiv", swapped=True)
-    __lt__, __le__, __gt__, __ge__ = (_comparison("fcmp_ordered", s) for s in ("<", "<=", ">", ">="))
+    __lt__, __le__, __gt__, __ge__, __eq__ = (
+        _comparison("fcmp_ordered", sign) for sign in ("<", "<=", ">", ">=", "==")
+    )
+    __ne__ = _comparison("fcmp_unordered", "!=")
 
     def __neg__(self):
         return Real(_drafts[-1].builder.fneg(self.value))
@@ -109,14 +117,17 @@ class Whole(_Value):
     kind, number, numbers = _INT, int, (int, np.integer)
     __add__, __sub__, __mul__ = map(_operator, ("add", "sub", "mul"))
     __radd__, __rsub__ = _operator("add", swapped=True), _operator("sub", swapped=True)
-    __rmul__ = _operator("mul", swapped=True)
-    __lt__, __le__, __gt__, __ge__ = (_comparison("icmp_signed", s) for s in ("<", "<=", ">", ">="))
+    __rmul__, __rshift__, __and__ = _operator("mul", swapped=True), _operator("ashr"), _operator("and_")
+    __lt__, __le__, __gt__, __ge__, __eq__, __ne__ = (
+        _comparison("icmp_signed", sign) for sign in ("<", "<=", ">", ">=", "==", "!=")
+    )
 
 
 class Truth(_Value):
     """A bool."""
 
     kind, number, numbers = _BOOL, int, (bool,)
+    __and__, __or__ = _operator("and_"), _operator("or_")
 
 
 class Memory:
@@ -240,7 +251,9 @@ def where(condition, a, b):
     builder = _drafts[-1].builder
     if isinstance(a, Memory):
         return Memory(builder.select(condition.value, a.data, b.data), a.dtype, a.owners | b.owners)
-    kind = Real if isinstance(a, Real | float) or isinstance(b, Real | float) else Whole
+    kind = next((kind for kind in (Truth, Real) if isinstance(a, kind) or isinstance(b, kind)), Whole)
+    if isinstance(a, float) or isinstance(b, float):
+        kind = Real
     return kind(builder.select(condition.value, kind.of(a), kind.of(b)))
 
 
