@@ -15,7 +15,7 @@ from quadcurv.boundary import frame, ghosts, with_ghosts
 from quadcurv.drivers import direct
 from quadcurv.mesh import QuadGrid, QuadMesh, StaggeredGrid
 from quadcurv.schemes import Diamond, Laplacian
-from quadcurv.stencils import Stencils
+from quadcurv.stencils import Frame, Stencils
 from quadcurv.types import Floats
 
 # Of one vertex of a face list and of one row of a matrix, in vertices of a grid.
@@ -62,13 +62,13 @@ def _evaluate_rows(
     grid: QuadGrid | StaggeredGrid, diamond_of: Diamond, boundary: str, results: Mapping[str, Floats]
 ) -> None:
     from quadcurv.kernels import cells, ranges, rows
+    from quadcurv.kernels.compiled import flat
 
-    wanted = [results[name].ravel() if name in results else None for name in _RESULTS]
-    liu = 0 if diamond_of.area == "quads" else None
-    around = frame(grid, boundary)
+    wanted, liu = _wanted(results), diamond_of.area == "quads"
     r, c = grid.shape
     if isinstance(grid, QuadGrid):
-        kernel = partial(rows.grid_curvatures, grid.points.ravel(), *around, liu, *wanted)
+        around = _around(grid.points, frame(grid, boundary))
+        kernel = partial(rows.grid_curvatures, flat(grid.points), 3 * c, *around, liu, *wanted)
     else:
         dual = grid.dual
         for axis in (0, 1):
@@ -76,33 +76,64 @@ def _evaluate_rows(
             if grid.wrap[axis] and not np.array_equal(first, last):  # the seam is that of the first
                 dual = dual.copy()
                 np.moveaxis(dual, axis, 0)[-1] = first
-        points, halo = grid.primal.ravel(), int(grid.has_ghosts)
-        kernel = partial(cells.staggered_curvatures, points, *around, halo, dual.ravel(), liu, *wanted)
+        points, size = flat(grid.primal), 3 * c
+        if grid.has_ghosts:
+            sides, size = grid.primal, 3 * (c + 2)
+            around = flat(sides[[0, -1], 1:-1]), flat(np.moveaxis(sides[:, [0, -1]], 1, 0))
+            points = points[size + 3 :]
+        else:
+            around = _around(grid.primal, frame(grid, boundary))
+        kernel = partial(cells.staggered_curvatures, points, size, *around, flat(dual), liu, *wanted)
     ranges.over(kernel, r, r * c, rows.LEAST_ROWS)
+
+
+def _wanted(results: Mapping[str, Floats]) -> list[Floats]:
+    """Results in the order of kernels, each of one dimension; of size 0 where nobody asks."""
+    return [results[name].ravel() if name in results else np.empty(0) for name in _RESULTS]
+
+
+def _around(points: Floats, frame: Frame) -> tuple[Floats, Floats]:
+    """Rows before and after the first and last one of a grid; columns beside all of these."""
+    from quadcurv.kernels.compiled import flat
+
+    beyond, across = frame.beyond.reshape(2, -1, 3), frame.across
+
+    def columns(k: int) -> Floats:
+        """The k-th from either side."""
+        sides = [k, points.shape[1] - 1 - k]
+        return np.concatenate((beyond[:1, sides], points[:, sides], beyond[1:, sides]))
+
+    near = columns(0)
+    if across.size == 0:
+        beside = near[:, ::-1]
+    else:
+        beside = near.copy()
+        for k, weight in enumerate(across):
+            beside += weight * (columns(k) - near)
+    return flat(frame.beyond), flat(np.moveaxis(beside, 1, 0))
 
 
 def _evaluate_rings(mesh: QuadMesh, diamond_of: Diamond, results: Mapping[str, Floats]) -> None:
     """Regular vertices, in an order that keeps neighbours close if the mesh has one."""
     from quadcurv.kernels import order as orders
     from quadcurv.kernels import ranges, rings
+    from quadcurv.kernels.compiled import flat
 
-    wanted = [results[name].ravel() if name in results else None for name in _RESULTS]
-    liu = 0 if diamond_of.area == "quads" else None
+    wanted, liu = _wanted(results), diamond_of.area == "quads"
     n, connectivity = len(mesh.points), mesh.connectivity
     points, found, order = mesh.points.ravel(), wanted, connectivity.order
     if order is not None:
         points = np.empty(3 * n)
         ranges.over(partial(orders.gather, mesh.points.ravel(), order.vertices, points), n, n)
-        found = [None if values is None else np.empty_like(values) for values in wanted]
+        found = [np.empty_like(values) for values in wanted]
     ring = connectivity.ring if order is None else order.ring
     far = order is None and connectivity.scattered
-    ranges.over(
-        partial(rings.ring_curvatures, points, ring, far, liu, *found), n, _RING_WORK * n, rings.BLOCK
-    )
+    kernel = partial(rings.ring_curvatures, flat(points), flat(ring), far, liu, *found)
+    ranges.over(kernel, n, _RING_WORK * n, rings.BLOCK)
     if order is not None:
         # Reads from everywhere overlap, writes to everywhere wait: hence not straight to their places.
         for values, ordered in zip(wanted, found, strict=True):
-            if values is not None:
+            if values.size:
                 ranges.over(partial(orders.gather, ordered, order.place, values), n, n)
 
 
@@ -114,6 +145,7 @@ def stiffness(
     The arrays of `out`, of the same pattern, are written to.
     """
     from quadcurv.kernels import ranges, rings, topology
+    from quadcurv.kernels.compiled import flat
 
     n, p, others = stencils.n, len(stencils.points), stencils.irregular
     indptr, rows = np.arange(0, 9 * n + 1, 9), None
@@ -138,8 +170,8 @@ def stiffness(
     if rows is not None:
         place = np.repeat(indptr[others] - rows.indptr[:-1], np.diff(rows.indptr)) + np.arange(rows.nnz)
         out.indices[place], out.data[place] = rows.indices, rows.data
-    points, ring = stencils.points.ravel(), stencils.ring
-    kernel = partial(rings.ring_stiffness, points, ring, indptr, out.indices, out.data)
+    points, ring = flat(stencils.points), flat(stencils.ring)
+    kernel = partial(rings.ring_stiffness, points, ring, flat(indptr), out.indices, out.data)
     ranges.over(kernel, n, _ROW_WORK * n, rings.BLOCK)
     return out
 

@@ -1,156 +1,199 @@
-"""The pass over the primal points of a staggered grid, whose quads lie across the edges of its cells."""
+"""The pass over the primal points of a staggered grid, whose quads lie across the edges of its cells.
 
-import numpy as np
+As that of `rows`; a and b are the rows of dual points before and after row p.
+"""
 
-from quadcurv.kernels.compiled import helper, inlined, kernel, wide
-from quadcurv.kernels.quad import flux_scale, fluxes, ring_normal, store_curvature
+from quadcurv.kernels.compiled import kernel
+from quadcurv.kernels.formulas import Carried, formula, span
+from quadcurv.kernels.quad import fluxes, quads_scale, ring_scale
 from quadcurv.kernels.rows import (
+    AREA,
     FIRST,
     LENGTH,
+    NORMAL,
     RING,
-    SHORT,
+    RING_SCALE,
+    ROW,
+    SCALE,
+    SQUARE,
     STRETCH,
-    STRIDE,
     WIDTH,
-    A,
     S,
     Y,
-    Z,
-    aligned,
+    dual_areas,
     last_quad,
-    load_line,
+    load_end,
     load_row,
+    ring_normal,
+    rooms,
+    unit_normals,
+    vector_curvatures,
 )
-from quadcurv.kernels.vector import ONE, THREE, apart, cross, place, triple, unit
+from quadcurv.kernels.vector import apart, cross, dot, less, place, plus, times, triple, unit
 
-EDGE = np.uint64(8 * SHORT)  # of the quads beside the points of a row, after what belongs to those below
+# In `work`, `NORMAL` and `LENGTH` are of the quads beside the points of row p. Those below them:
+BELOW, BELOW_LENGTH = 17 * S, 20 * S
+ROOMS = (4 * ROW, ROW + Y, 21 * S)
 
 
-@inlined
 def below(planes, p, q, b, i):
     """Diagonals of the quad of the edge between rows p and q, across dual row b."""
-    return apart(planes, q + i, planes, p + i, Y), apart(planes, b + i + ONE, planes, b + i, Y)
+    return apart(planes, q + i, planes, p + i, Y), apart(planes, b + i + 1, planes, b + i, Y)
 
 
-@inlined
-def beside(planes, p, a, b, i):
+def beside_right(planes, p, a, b, i):
     """Diagonals of the quad of the edge to the right in row p, from dual row b to a."""
-    return apart(planes, p + i + ONE, planes, p + i, Y), apart(planes, a + i + ONE, planes, b + i + ONE, Y)
+    return apart(planes, p + i + 1, planes, p + i, Y), apart(planes, a + i + 1, planes, b + i + 1, Y)
 
 
-@helper
+@formula
+def load_dual(planes, to, dual, at, width):
+    """As `load_row`."""
+    for k in span(0, width):
+        place(planes, to + k, Y, triple(dual, at + 3 * k, 1))
+
+
+@formula
 def first_fluxes(planes, p, q, b, part, width):
-    """Fluxes from primal row q into row p, across dual row b."""
-    wide()
-    for i in range(FIRST, FIRST + width):
+    """Begin the sums of row q."""
+    for i in span(FIRST, FIRST + width):
         u, v = below(planes, p, q, b, i)
-        n, part[i + A] = unit(cross(u, v))
-        flux, _ = fluxes(u, v, n)
-        place(part, i, Y, flux)
+        n, part[i + ROW] = unit(cross(u, v))
+        place(part, i, Y, fluxes(u, v, n)[0])
 
 
-@helper
+@formula
 def first_edge(planes, p, a, b, work):
     """The edge to the left of the first point of row p."""
-    u, v = beside(planes, p, a, b, FIRST - ONE)
-    n, work[FIRST - ONE + EDGE + LENGTH] = unit(cross(u, v))
-    place(work, FIRST - ONE + EDGE, S, n)
+    u, v = beside_right(planes, p, a, b, FIRST - 1)
+    n, work[FIRST - 1 + LENGTH] = unit(cross(u, v))
+    place(work, FIRST - 1 + NORMAL, S, n)
 
 
-@helper
-def cell_normals(planes, p, q, a, b, work, liu, H, normal, g, width):
-    """Normals of the quads below and beside row p, and of the rings around it, of a stretch from column g."""
-    wide()
-    for k in range(np.uint64(0), width):
+@formula
+def edge_and_ring_normals(planes, p, q, a, b, work, g):
+    """Normals of the quads below and beside row p, and of the rings around it."""
+    for k in span(0, STRETCH):
         i, j = FIRST + g + k, FIRST + k
         u, v = below(planes, p, q, b, i)
-        place(work, j, S, cross(u, v))
-        u, v = beside(planes, p, a, b, i)
-        place(work, j + EDGE, S, cross(u, v))
-        u = apart(planes, b + i + ONE, planes, a + i, Y)
-        v = apart(planes, a + i + ONE, planes, b + i, Y)
-        ring_normal(work, j + RING, S, u, v, liu, H, normal)
+        place(work, j + BELOW, S, cross(u, v))
+        u, v = beside_right(planes, p, a, b, i)
+        place(work, j + NORMAL, S, cross(u, v))
+        u = apart(planes, b + i + 1, planes, a + i, Y)
+        v = apart(planes, a + i + 1, planes, b + i, Y)
+        n = cross(u, v)
+        place(work, j + RING, S, n)
+        work[j + SQUARE] = dot(n, n)
 
 
-@helper
-def cell_scales(work, part, liu, H, normal, area, at, g, width):
-    """As `row_scales`."""
-    wide()
-    before = work[FIRST - ONE + EDGE + LENGTH]
-    for k in range(np.uint64(0), width):
-        j, lengths = FIRST + k, 0.0
-        n, under = unit(triple(work, j, S))
-        place(work, j, S, n)
-        n, length = unit(triple(work, j + EDGE, S))
-        place(work, j + EDGE, S, n)
-        if liu is not None:
-            i = j + g
-            lengths = (under + part[i + A]) + (length + before)
-            part[i + A] = under
-            work[j + EDGE + LENGTH] = before = length
-        flux_scale(work, j + RING, S, lengths, liu, H, normal, area, at + k)
+@formula
+def edge_scales(work):
+    """Make normals of quads of length one; scales from the squares of the rings' normals."""
+    for j in span(FIRST, FIRST + STRETCH, 2):
+        for plane, lengths in ((BELOW, BELOW_LENGTH), (NORMAL, LENGTH)):
+            n, length = unit(triple(work, j + plane, S))
+            place(work, j + plane, S, n)
+            work[j + lengths] = length
+        work[j + SCALE] = ring_scale(work[j + SQUARE])
 
 
-@helper
-def cell_curvatures(planes, p, q, a, b, work, part, Hn, H, at, g, width):
-    """Finish the points of primal row p, between dual rows a and b; q is the next one."""
-    wide()
-    u, v = beside(planes, p, a, b, FIRST + g - ONE)
-    (ex, ey, ez), _ = fluxes(u, v, triple(work, FIRST - ONE + EDGE, S))
-    for k in range(np.uint64(0), width):
+@formula
+def liu_edge_scales(work, part, g):
+    """Scales from the lengths of the quads' normals instead, the rings' elsewhere."""
+    before = Carried((work[FIRST - 1 + LENGTH],))
+    for k in span(0, STRETCH):
+        i, j = FIRST + g + k + ROW, FIRST + k
+        under, length = work[j + BELOW_LENGTH], work[j + LENGTH]
+        lengths = (under + part[i]) + (length + before.get()[0])
+        before.set((length,))
+        part[i] = under
+        work[j + AREA] = lengths
+        work[j + RING_SCALE] = work[j + SCALE]
+        work[j + SCALE] = quads_scale(lengths)
+
+
+def sums(planes, p, q, a, b, work, part, g, width):
+    """Curvature normals of the points of row p; the sums of those of row q begin."""
+    u, v = beside_right(planes, p, a, b, FIRST + g - 1)
+    before = Carried(fluxes(u, v, triple(work, FIRST - 1 + NORMAL, S))[0])
+    for k in span(0, width):
         i, j = FIRST + g + k, FIRST + k
         u, v = below(planes, p, q, b, i)
-        (gx, gy, gz), _ = fluxes(u, v, triple(work, j, S))
-        u, v = beside(planes, p, a, b, i)
-        (fx, fy, fz), _ = fluxes(u, v, triple(work, j + EDGE, S))
-        tx = (gx - part[i]) + (fx - ex)
-        ty = (gy - part[i + Y]) + (fy - ey)
-        tz = (gz - part[i + Z]) + (fz - ez)
-        place(part, i, Y, (gx, gy, gz))
-        ex, ey, ez = fx, fy, fz
-        store_curvature((tx, ty, tz), work, j + RING, S, Hn, H, at + k)
+        under, _ = fluxes(u, v, triple(work, j + BELOW, S))
+        u, v = beside_right(planes, p, a, b, i)
+        right, _ = fluxes(u, v, triple(work, j + NORMAL, S))
+        t = plus(less(under, triple(part, i, Y)), less(right, before.get()))
+        before.set(right)
+        place(part, i, Y, under)
+        yield k, times(t, work[j + SCALE])
+
+
+@formula
+def cell_vectors(planes, p, q, a, b, work, part, Hn, g, at, width):
+    """Write the curvature normals of row p from point number `at` on."""
+    for k, h in sums(planes, p, q, a, b, work, part, g, width):
+        place(Hn, 3 * (at + k), 1, h)
+
+
+@formula
+def cell_curvatures(planes, p, q, a, b, work, part, scale, H, g, at, width):
+    """Write the curvatures of row p from point number `at` on."""
+    for k, h in sums(planes, p, q, a, b, work, part, g, width):
+        H[at + k] = -dot(h, ring_normal(work, scale, k))
 
 
 @kernel
-def staggered_curvatures(points, beyond, across, halo, dual, liu, Hn, H, normal, area, start, stop):
+def _pass(points, size, beyond, beside, dual, liu, Hn, H, normal, area, start, stop, planes, part, work):
+    c, rows = beyond.size // 6, beside.size // 6
+    vectors, numbers, normals, areas = Hn.size > 0, H.size > 0, normal.size > 0, area.size > 0
+    scale = RING_SCALE if liu else SCALE
+    for begin in range(0, c, WIDTH):
+        end = min(begin + WIDTH, c)
+        p, q, a, b = 0, ROW, 2 * ROW, 3 * ROW
+        for i in range(start - 1, stop + 1):  # p and a are rows i - 1 once they are there
+            inside = 0 <= i < rows - 2
+            first = size * i if inside else 0 if i < 0 else 3 * c
+            to, width, row = q + FIRST, end - begin, i + 1
+            load_row(planes, to, points, beyond, inside, first + 3 * begin, width)
+            load_end(planes, to - 1, points, beyond, beside, inside, begin > 0, first + 3 * begin - 3, row)
+            load_end(planes, to + width, points, beyond, beside, inside, end < c, first + 3 * end, rows + row)
+            if i >= start:
+                load_dual(planes, b + FIRST, dual, 3 * ((c + 1) * i + begin), width + 1)
+            if i == start:
+                first_fluxes(planes, p, q, b, part, width)
+            elif i > start:
+                first_edge(planes, p, a, b, work)
+                for left in range(begin, end, STRETCH):
+                    right = min(left + STRETCH, end)
+                    g, at, width = left - begin, (i - 1) * c + left, right - left
+                    edge_and_ring_normals(planes, p, q, a, b, work, g)
+                    edge_scales(work)
+                    if liu:
+                        liu_edge_scales(work, part, g)
+                    if vectors:
+                        cell_vectors(planes, p, q, a, b, work, part, Hn, g, at, width)
+                        if numbers:
+                            vector_curvatures(work, scale, Hn, H, at, width)
+                    elif numbers:
+                        cell_curvatures(planes, p, q, a, b, work, part, scale, H, g, at, width)
+                    if normals:
+                        unit_normals(work, scale, normal, at, width)
+                    if areas:
+                        dual_areas(work, liu, area, at, width)
+                    last_quad(work)
+            p, q, a, b = q, p, b, a
+
+
+def staggered_curvatures(points, size, beyond, beside, dual, liu, Hn, H, normal, area, start, stop):
     """As `grid_curvatures`, of the primal points of a staggered grid.
 
     Parameters
     ----------
-    points : (3 r c,) float64
-        Primal points; with halo = 1 (3 (r + 2) (c + 2),), those around them too.
-    beyond : (6 c,) float64
-        As for `grid_curvatures`; with halo = 1 not read.
-    across
-        As for `grid_curvatures`; with halo = 1 not read.
-    halo : int
+    points, size, beyond, beside
+        As for `grid_curvatures`, of primal points.
     dual : (3 (r + 1) (c + 1),) float64
         Dual points; those of the first row and column come before the first primal ones.
     liu, Hn, H, normal, area, start, stop
         As for `grid_curvatures`.
     """
-    c = beyond.size // 6
-    room = aligned(16 * STRIDE + 12 * SHORT)
-    planes, part, work = room[: 12 * STRIDE], room[12 * STRIDE : 16 * STRIDE], room[16 * STRIDE :]
-    for begin in range(0, c, WIDTH):
-        end = min(begin + WIDTH, c)
-        p, q, a, b = np.uint64(0), THREE * Y, THREE * Z, THREE * A
-        for i in range(start - 1, stop + 1):  # p and a are rows i - 1 once they are there
-            size = 3 * (c + 2 * halo)
-            load_line(planes, q, points, beyond, i + halo, size, across, begin + halo, end + halo)
-            if i >= start:
-                at = np.uint64(3 * ((c + 1) * i + begin))
-                load_row(planes, b, dual, at, np.uint64(end - begin + 1))
-            if i == start:
-                first_fluxes(planes, p, q, b, part, np.uint64(end - begin))
-            elif i > start:
-                first_edge(planes, p, a, b, work)
-                for left in range(begin, end, STRETCH):
-                    right = min(left + STRETCH, end)
-                    g, width = np.uint64(left - begin), np.uint64(right - left)
-                    at = np.uint64((i - 1) * c + left)
-                    cell_normals(planes, p, q, a, b, work, liu, H, normal, g, width)
-                    cell_scales(work, part, liu, H, normal, area, at, g, width)
-                    cell_curvatures(planes, p, q, a, b, work, part, Hn, H, at, g, width)
-                    last_quad(work, FIRST + EDGE, width)
-            p, q, a, b = q, p, b, a
+    _pass(points, size, beyond, beside, dual, liu, Hn, H, normal, area, start, stop, *rooms(ROOMS))

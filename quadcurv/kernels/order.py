@@ -2,8 +2,9 @@
 
 import numpy as np
 
-from quadcurv.kernels.compiled import helper, kernel
-from quadcurv.kernels.vector import ONE, THREE, place, triple
+from quadcurv.kernels.compiled import flat, helper, kernel
+from quadcurv.kernels.formulas import formula, span
+from quadcurv.kernels.vector import place, triple
 
 PATCH = 65536  # vertices: one step of breadth-first order through them stays in the first-level cache
 
@@ -64,12 +65,28 @@ def renumbered(ring, order):
     return moved, place
 
 
+@formula
+def gather_numbers(values, order, ordered, start, stop):
+    """Numbers."""
+    for k in span(start, stop):
+        ordered[k] = values[order[k]]
+
+
+@formula
+def gather_triples(values, order, ordered, start, stop):
+    """Triples."""
+    for k in span(start, stop):
+        place(ordered, 3 * k, 1, triple(values, 3 * order[k], 1))
+
+
 @kernel
+def _gather(values, order, ordered, start, stop):
+    if values.size == order.size:
+        gather_numbers(values, order, ordered, start, stop)
+    else:
+        gather_triples(values, order, ordered, start, stop)
+
+
 def gather(values, order, ordered, start, stop):
     """Triples (3 n,) or numbers (n,) in another order: the k-th is number order[k], for start <= k < stop."""
-    if values.size == order.size:
-        for k in range(np.uint64(start), np.uint64(stop)):
-            ordered[k] = values[np.uint64(order[k])]
-    else:
-        for k in range(np.uint64(start), np.uint64(stop)):
-            place(ordered, THREE * k, ONE, triple(values, THREE * np.uint64(order[k]), ONE))
+    _gather(flat(values), flat(order), ordered, start, stop)

@@ -1,68 +1,168 @@
-"""Regular vertices of a face list by their rings: what `rows` gives on grids, and the stiffness matrix."""
+"""Regular vertices of a face list by their rings: what `rows` gives on grids, and the stiffness matrix.
+
+A block of vertices is done at once. Planes `x` hold their nine points, the vertices themselves and then
+their rings (a, d, a, d, ...); the k-th corner of a vertex is (a, d, a) from the (2 k + 1)-th point on.
+"""
 
 import numpy as np
 
-from quadcurv.kernels.compiled import helper, inlined, kernel, prefetch, wide
-from quadcurv.kernels.quad import conductance, flux_scale, ring_normal, store_curvature
-from quadcurv.kernels.vector import ONE, THREE, apart, cross, fused_cross, place, triple, unit
+from quadcurv.kernels.compiled import kernel
+from quadcurv.kernels.formulas import formula, prefetch, span, where
+from quadcurv.kernels.quad import (
+    conductance,
+    quads_area,
+    quads_scale,
+    ring_area,
+    ring_scale,
+)
+from quadcurv.kernels.vector import apart, cross, dot, fused_cross, place, plus, times, triple, unit
 
 BLOCK = 64  # vertices done at once: their rings stay in the first-level cache
 AHEAD = 16  # vertices: where the points of rings lie far apart, they are asked for that early
-SIDE, TWICE, POINT = np.uint64(BLOCK), np.uint64(2 * BLOCK), np.uint64(3 * BLOCK)
-CORNERS = np.uint64(4 * BLOCK)
+POINT = 3 * BLOCK  # between points
+CORNERS = 4 * BLOCK  # between planes of what there is of every corner
+# In `work`: normals of corners and their lengths; normals of rings; what sums of fluxes are multiplied by;
+# dual areas.
+LENGTH, RING, SCALE, AREA = (k * BLOCK for k in (12, 16, 19, 20))
+# For the stiffness: weights of the nine points; `conductance` of corners.
+OWN, MIXED = 9 * BLOCK, 13 * BLOCK
 
 
-@inlined
+def edge(k):
+    """Place of the k-th neighbour along an edge."""
+    return (2 * (k % 4) + 1) * POINT
+
+
+@formula
 def gather_ring(points, ring, v, x, k):
-    """Put vertex v and its ring, or v nine times, at place k of the planes of nine points."""
-    regular = ring[v, 0] >= 0
+    """Put vertex v and its ring, or v nine times if it has none, at place k of the planes."""
+    regular = ring[8 * v] >= 0
     for j in range(9):
-        i = THREE * np.uint64(ring[v, j - 1] if regular and j > 0 else v)
-        place(x, np.uint64(j) * POINT + k, SIDE, triple(points, i, ONE))
+        i = v if j == 0 else where(regular, ring[8 * v + j - 1], v)
+        place(x, j * POINT + k, BLOCK, triple(points, 3 * i, 1))
 
 
-@helper
-def corner_normals(x, a, d, b, normals, size):
+@formula
+def ask_ring(points, ring, v):
+    """Ask for the memory of the ring of vertex v."""
+    for j in range(8):
+        prefetch(points, 3 * ring[8 * v + j])
+
+
+@formula
+def corner_normals(x, work, corner, a, b):
     """Normals (d - c) x (b - a) of one corner of every vertex c of a block."""
-    wide()
-    for k in range(np.uint64(0), size):
-        place(normals, k, CORNERS, cross(apart(x, d + k, x, k, SIDE), apart(x, b + k, x, a + k, SIDE)))
+    for k in span(0, BLOCK):
+        u, v = apart(x, a + POINT + k, x, k, BLOCK), apart(x, b + k, x, a + k, BLOCK)
+        place(work, corner * BLOCK + k, CORNERS, cross(u, v))
 
 
-@helper
-def block_curvatures(x, size, normals, ring, at, liu, Hn, H, normal, area):
-    """Finish the vertices of a block from the planes x of their nine points."""
-    wide()
-    a, d, b, e = POINT, THREE * POINT, np.uint64(5) * POINT, np.uint64(7) * POINT  # along the edges
-    for j, first, last in ((0, a, d), (1, d, b), (2, b, e), (3, e, a)):
-        corner_normals(x, first, first + POINT, last, normals[BLOCK * j :], size)
-    for k in range(np.uint64(0), CORNERS):
-        n, normals[k + THREE * CORNERS] = unit(triple(normals, k, CORNERS))
-        place(normals, k, CORNERS, n)
-    for k in range(np.uint64(0), size):
-        u, v = apart(x, b + k, x, a + k, SIDE), apart(x, e + k, x, d + k, SIDE)
-        ring_normal(ring, k, SIDE, u, v, liu, H, normal)
-    for k in range(np.uint64(0), size):
-        i = k + THREE * CORNERS
-        lengths = (normals[i] + normals[i + SIDE]) + (normals[i + TWICE] + normals[i + POINT])
-        flux_scale(ring, k, SIDE, lengths, liu, H, normal, area, at + k)
-    for k in range(np.uint64(0), size):
-        f = fused_cross(apart(x, d + k, x, a + k, SIDE), triple(normals, k, CORNERS))
-        g = fused_cross(apart(x, b + k, x, d + k, SIDE), triple(normals, k + SIDE, CORNERS))
-        h = fused_cross(apart(x, e + k, x, b + k, SIDE), triple(normals, k + TWICE, CORNERS))
-        t = fused_cross(apart(x, a + k, x, e + k, SIDE), triple(normals, k + POINT, CORNERS))
-        t = (f[0] + g[0]) + (h[0] + t[0]), (f[1] + g[1]) + (h[1] + t[1]), (f[2] + g[2]) + (h[2] + t[2])
-        store_curvature(t, ring, k, SIDE, Hn, H, at + k)
+@formula
+def corner_units(work):
+    """Make normals of corners of length one."""
+    for k in span(0, CORNERS, 4):
+        n, length = unit(triple(work, k, CORNERS))
+        place(work, k, CORNERS, n)
+        work[LENGTH + k] = length
+
+
+@formula
+def ring_normals(x, work):
+    """Unit normals of rings, and the finite-volume scheme's scales and areas."""
+    for k in span(0, BLOCK, 2):
+        u, v = apart(x, edge(2) + k, x, edge(0) + k, BLOCK), apart(x, edge(3) + k, x, edge(1) + k, BLOCK)
+        n = cross(u, v)
+        square = dot(n, n)
+        work[SCALE + k] = scale = ring_scale(square)
+        work[AREA + k] = ring_area(square)
+        place(work, RING + k, BLOCK, times(n, scale))
+
+
+@formula
+def liu_scales(work):
+    """Scales and areas from the lengths of the corners' normals instead."""
+    for k in span(0, BLOCK):
+        i = LENGTH + k
+        lengths = (work[i] + work[i + BLOCK]) + (work[i + 2 * BLOCK] + work[i + 3 * BLOCK])
+        work[SCALE + k] = quads_scale(lengths)
+        work[AREA + k] = quads_area(lengths)
+
+
+def sums(x, work, size):
+    """Curvature normals: at corner (a, d, b) the flux is (b - a) x n, n the quad's normal."""
+    for k in span(0, size):
+        first, second, third, fourth = (
+            fused_cross(
+                apart(x, edge(corner + 1) + k, x, edge(corner) + k, BLOCK),
+                triple(work, corner * BLOCK + k, CORNERS),
+            )
+            for corner in range(4)
+        )
+        yield k, times(plus(plus(first, second), plus(third, fourth)), work[SCALE + k])
+
+
+@formula
+def block_vectors(x, work, Hn, at, size):
+    """Write the curvature normals of a block from vertex number `at` on."""
+    for k, h in sums(x, work, size):
+        place(Hn, 3 * (at + k), 1, h)
+
+
+@formula
+def block_curvatures(x, work, H, at, size):
+    """Write the curvatures of a block from vertex number `at` on."""
+    for k, h in sums(x, work, size):
+        H[at + k] = -dot(h, triple(work, RING + k, BLOCK))
+
+
+@formula
+def unit_normals(work, normal, at, size):
+    """Write normals."""
+    for k in span(0, size):
+        place(normal, 3 * (at + k), 1, triple(work, RING + k, BLOCK))
+
+
+@formula
+def dual_areas(work, area, at, size):
+    """Write dual areas."""
+    for k in span(0, size):
+        area[at + k] = work[AREA + k]
 
 
 @kernel
+def _pass(points, ring, far, liu, Hn, H, normal, area, start, stop, x, work):
+    vectors, numbers, normals, areas = Hn.size > 0, H.size > 0, normal.size > 0, area.size > 0
+    for at in range(start, stop, BLOCK):
+        size = min(BLOCK, stop - at)
+        for k in range(size):
+            if far and at + k + AHEAD < stop:
+                ask_ring(points, ring, at + k + AHEAD)
+            gather_ring(points, ring, at + k, x, k)
+        for corner in range(4):
+            a, b = (2 * corner + 1) * POINT, ((2 * corner + 2) % 8 + 1) * POINT
+            corner_normals(x, work, corner, a, b)
+        corner_units(work)
+        if not liu or numbers or normals:
+            ring_normals(x, work)
+        if liu:
+            liu_scales(work)
+        if vectors:
+            block_vectors(x, work, Hn, at, size)
+        if numbers:
+            block_curvatures(x, work, H, at, size)
+        if normals:
+            unit_normals(work, normal, at, size)
+        if areas:
+            dual_areas(work, area, at, size)
+
+
 def ring_curvatures(points, ring, far, liu, Hn, H, normal, area, start, stop):
     """As `grid_curvatures`, of the regular vertices start..stop of a face list.
 
     Parameters
     ----------
     points : (3 n,) float64
-    ring : (n, 8) int32
+    ring : (8 n,) int32
         The ring (a, d, a, d, ...) of each vertex, counter-clockwise; negative first where the vertex is not
         regular, whose results are NaN.
     far : bool
@@ -70,51 +170,75 @@ def ring_curvatures(points, ring, far, liu, Hn, H, normal, area, start, stop):
     liu, Hn, H, normal, area, start, stop
         As for `grid_curvatures`.
     """
-    x, normals, weights = np.empty(9 * 3 * BLOCK), np.ones(16 * BLOCK), np.empty(4 * BLOCK)
-    for begin in range(start, stop, BLOCK):
-        end = min(begin + BLOCK, stop)
-        size = np.uint64(end - begin)
-        for k in range(end - begin):
-            ahead = begin + k + AHEAD
-            if far and ahead < stop and ring[ahead, 0] >= 0:
-                for j in range(8):
-                    prefetch(points, 3 * ring[ahead, j])
-            gather_ring(points, ring, begin + k, x, np.uint64(k))
-        block_curvatures(x, size, normals, weights, np.uint64(begin), liu, Hn, H, normal, area)
+    _pass(
+        points, ring, far, liu, Hn, H, normal, area, start, stop, np.zeros(27 * BLOCK), np.zeros(21 * BLOCK)
+    )
 
 
-@helper
-def corner_weights(x, a, d, b, own, mixed, size):
-    """Planes of `conductance` of the corner (a, d, b) of each vertex of a block."""
-    wide()
-    for k in range(np.uint64(0), size):
-        own[k], mixed[k] = conductance(apart(x, d + k, x, k, SIDE), apart(x, b + k, x, a + k, SIDE))
+@formula
+def corner_weights(x, work, corner, a, b):
+    """`conductance` of one corner of every vertex of a block."""
+    for k in span(0, BLOCK):
+        u, v = apart(x, a + POINT + k, x, k, BLOCK), apart(x, b + k, x, a + k, BLOCK)
+        work[OWN + corner * BLOCK + k], work[MIXED + corner * BLOCK + k] = conductance(u, v)
 
 
-@helper
-def stiffness_rows(own, mixed, size, row):
-    """Rows of the stiffness of a block, planes of the weights of the nine points in `row`."""
-    for k in range(np.uint64(0), size):
-        row[k] = (own[k] + own[k + SIDE]) + (own[k + TWICE] + own[k + POINT])
-        for j in range(4):
-            at, before = np.uint64(j) * SIDE + k, np.uint64((j + 3) % 4) * SIDE + k
-            row[np.uint64(2 * j + 1) * SIDE + k] = mixed[at] - mixed[before]
-            row[np.uint64(2 * j + 2) * SIDE + k] = -own[at]
+@formula
+def stiffness_rows(work):
+    """Weights of the nine points in the rows of a block."""
+    for k in span(0, BLOCK):
+        own = [work[OWN + corner * BLOCK + k] for corner in range(4)]
+        mixed = [work[MIXED + corner * BLOCK + k] for corner in range(4)]
+        work[k] = (own[0] + own[1]) + (own[2] + own[3])
+        for corner in range(4):
+            work[(2 * corner + 1) * BLOCK + k] = mixed[corner] - mixed[corner - 1]
+            work[(2 * corner + 2) * BLOCK + k] = -own[corner]
 
 
-@helper
-def ranks(column, size, rank):
+@formula
+def ranks(column, rank):
     """Place of each of the nine columns in its row when sorted: how many are smaller."""
-    for i in range(9):
-        at = np.uint64(i) * SIDE
-        for k in range(np.uint64(0), size):
-            smaller = np.int32(0)
+    for k in span(0, BLOCK):
+        for i in range(9):
+            smaller = 0
             for j in range(9):
-                smaller += np.int32(column[np.uint64(j) * SIDE + k] < column[at + k])
-            rank[at + k] = smaller
+                smaller = smaller + where(column[j * BLOCK + k] < column[i * BLOCK + k], 1, 0)
+            rank[i * BLOCK + k] = smaller
+
+
+@formula
+def gather_columns(ring, v, column, k):
+    """Put the columns of row v at place k."""
+    for j in range(9):
+        column[j * BLOCK + k] = v if j == 0 else ring[8 * v + j - 1]
+
+
+@formula
+def store_row(work, column, rank, first, indices, data, k):
+    """Write the k-th row of a block in the order of its columns, from entry `first` on."""
+    for j in range(9):
+        i = j * BLOCK + k
+        indices[first + rank[i]] = column[i]
+        data[first + rank[i]] = work[i]
 
 
 @kernel
+def _rows(points, ring, indptr, indices, data, start, stop, x, work, column, rank):
+    for at in range(start, stop, BLOCK):
+        size = min(BLOCK, stop - at)
+        for k in range(size):
+            gather_ring(points, ring, at + k, x, k)
+            gather_columns(ring, at + k, column, k)
+        for corner in range(4):
+            a, b = (2 * corner + 1) * POINT, ((2 * corner + 2) % 8 + 1) * POINT
+            corner_weights(x, work, corner, a, b)
+        stiffness_rows(work)
+        ranks(column, rank)
+        for k in range(size):
+            if ring[8 * (at + k)] >= 0:
+                store_row(work, column, rank, indptr[at + k], indices, data, k)
+
+
 def ring_stiffness(points, ring, indptr, indices, data, start, stop):
     """Rows start..stop of the stiffness in CSR, columns sorted, of regular vertices; others are left alone.
 
@@ -128,28 +252,17 @@ def ring_stiffness(points, ring, indptr, indices, data, start, stop):
         Written to.
     start, stop : int
     """
-    x, row = np.empty(9 * 3 * BLOCK), np.empty(9 * BLOCK)
-    own, mixed = np.empty(4 * BLOCK), np.empty(4 * BLOCK)
-    column, rank = np.empty(9 * BLOCK, np.int32), np.empty(9 * BLOCK, np.int32)
-    for begin in range(start, stop, BLOCK):
-        end = min(begin + BLOCK, stop)
-        size = np.uint64(end - begin)
-        for k in range(end - begin):
-            gather_ring(points, ring, begin + k, x, np.uint64(k))
-            column[k] = begin + k
-            for j in range(8):
-                column[BLOCK * (j + 1) + k] = ring[begin + k, j]
-        for j in range(4):
-            a, b = np.uint64(2 * j + 1) * POINT, np.uint64((2 * j + 2) % 8 + 1) * POINT
-            corner_weights(x, a, a + POINT, b, own[BLOCK * j :], mixed[BLOCK * j :], size)
-        stiffness_rows(own, mixed, size, row)
-        ranks(column, size, rank)
-        for k in range(np.uint64(0), size):
-            v = begin + np.int64(k)
-            if ring[v, 0] < 0:
-                continue
-            first = np.uint64(indptr[v])
-            for j in range(9):
-                at = np.uint64(j) * SIDE + k
-                i = first + np.uint64(rank[at])
-                indices[i], data[i] = column[at], row[at]
+    column, rank = np.zeros((2, 9 * BLOCK), np.int32)
+    _rows(
+        points,
+        ring,
+        indptr,
+        indices,
+        data,
+        start,
+        stop,
+        np.zeros(27 * BLOCK),
+        np.zeros(17 * BLOCK),
+        column,
+        rank,
+    )

@@ -1,252 +1,315 @@
 """The pass over the vertices of a grid, row by row: see `quad` for how its loops are written.
 
+Of rows that follow each other, o, p and q say where in `planes` they are. Quads lie between p and q and add
+to the vertices of both: the sums of p are finished, those of q wait in `part` for the next row of quads.
+`work` holds what the loops over a stretch of a row, from column g on, leave for each other.
+
 Planes of a row begin where a page of memory begins, or in its middle. (A load that follows a store to the
 same place of another page waits for it; so placed, loads keep ahead of stores.)
 """
 
 import numpy as np
 
-from quadcurv.kernels.compiled import helper, inlined, kernel, prefetch, prefetch_to_write, wide
-from quadcurv.kernels.quad import flux_scale, fluxes, ring_normal, store_curvature
-from quadcurv.kernels.vector import ONE, THREE, TWO, apart, cross, place, triple, unit
+from quadcurv.kernels.compiled import kernel
+from quadcurv.kernels.formulas import Carried, formula, prefetch, span, where
+from quadcurv.kernels.quad import fluxes, quads_area, quads_scale, ring_area, ring_scale
+from quadcurv.kernels.vector import apart, cross, dot, less, place, plus, times, triple, unit
 
 WIDTH = 2048  # columns done at once: their rows stay in the second-level cache
-STRETCH = 80  # of them, by one loop after the other: what these leave stays in the first-level cache
+STRETCH = 64  # of them, by one loop after the other: what these leave stays in the first-level cache
 LEAST_ROWS = 16  # of a range of its own, which computes a row of quads that others compute too
 PAGE = 512  # doubles
-STRIDE = WIDTH + PAGE // 2  # between planes of a row
-SHORT = STRETCH + 16  # between planes of a stretch
-FIRST = np.uint64(8)  # place of the first vertex in a plane, its left neighbour before it
-Y, Z, A, S = np.uint64(STRIDE), np.uint64(2 * STRIDE), np.uint64(3 * STRIDE), np.uint64(SHORT)
-LENGTH, RING = np.uint64(3 * SHORT), np.uint64(4 * SHORT)
-U, V = np.uint64(8 * SHORT), np.uint64(11 * SHORT)
+Y = WIDTH + PAGE // 2  # between planes of a row
+ROW = 3 * Y  # between rows
+S = STRETCH + 8  # between planes of a stretch
+FIRST = 8  # place of the first vertex in a plane, its left neighbour before it
+# In `work`: normals of quads, their lengths, diagonals; normals of rings, their squares and scales;
+# what sums of fluxes are multiplied by; what dual areas come from.
+NORMAL, LENGTH, U, V, RING, SQUARE, RING_SCALE, SCALE, AREA = (
+    k * S for k in (0, 3, 4, 7, 10, 13, 14, 15, 16)
+)
+ROOMS = (4 * ROW, ROW + Y, 17 * S, 3 * S)  # planes, part, work, and where vectors go that nobody wants
 
 
-@helper
-def aligned(size):
-    """Room for doubles that begins a page of memory."""
-    room = np.empty(size + PAGE)
-    return room[-np.int64(room.ctypes.data // 8) % PAGE :]
+def rooms(sizes):
+    """Scratch for one call of a pass, each array at the beginning of a page."""
+    room = np.empty(sum(size + PAGE for size in sizes) + PAGE)
+    at = -(room.__array_interface__["data"][0] // 8) % PAGE
+    found = []
+    for size in sizes:
+        found.append(room[at : at + size])
+        at += -(-size // PAGE) * PAGE
+    return found
 
 
-@inlined
-def prefetch_results(values, size, at, turn):
-    """Ask for the memory of a third of the results of the stretch from vertex `at` on, if they are wanted."""
-    if values is not None:
-        third = size * STRETCH // 3
-        begin = size * at + turn * third
-        if begin + third <= values.size:
-            for k in range(0, third, 8):
-                prefetch_to_write(values, begin + k)
+@formula
+def load_row(planes, to, points, beyond, inside, at, width):
+    """Put a row that begins at number `at` of the points, or of those beyond them, into planes."""
+    points = where(inside, points, beyond)
+    for k in span(0, width):
+        place(planes, to + k, Y, triple(points, at + 3 * k, 1))
 
 
-@helper
-def prefetch_stretch(points, first, Hn, H, normal, area, at, turn):
-    """Ask for the stretch of the points from points[first] on and for its results', one third a turn.
-
-    As the work on another stretch goes on it arrives; all of it at once would have to be waited for.
-    """
-    begin = first + turn * STRETCH
-    if begin + STRETCH <= points.size:
-        for k in range(0, STRETCH, 8):
-            prefetch(points, begin + k)
-    prefetch_results(Hn, 3, at, turn)
-    prefetch_results(H, 1, at, turn)
-    prefetch_results(normal, 3, at, turn)
-    prefetch_results(area, 1, at, turn)
+@formula
+def load_end(planes, to, points, beyond, beside, inside, within, at, row):
+    """Put the point before or after a row, or that of `beside` where rows end, into planes."""
+    points = where(within, where(inside, points, beyond), beside)
+    place(planes, to, Y, triple(points, where(within, at, 3 * row), 1))
 
 
-@helper
-def load_row(planes, p, points, at, width):
-    """Put a row that begins at points[at] into planes p."""
-    wide()
-    for k in range(np.uint64(0), width):
-        place(planes, p + FIRST + k, Y, triple(points, at + THREE * k, ONE))
-
-
-@helper
-def load_ends(planes, p, points, first, size, across, begin, end):
-    """Put what is beside columns begin..end of the row of `size` coordinates from points[first] on.
-
-    Beyond the row it follows from `across`: see `grid_curvatures`.
-    """
-    last = first + size - 3
-    for side in range(2):
-        near, far, step = (first, last, 3) if side == 0 else (last, first, -3)
-        beside = first + (3 * begin - 3 if side == 0 else 3 * end)
-        to = p + FIRST - ONE if side == 0 else p + FIRST + np.uint64(end - begin)
-        for x in range(3):
-            if first <= beside <= last:
-                value = points[beside + x]
-            elif across.size == 0:
-                value = points[far + x]
-            else:
-                value = points[near + x]
-                for k in range(across.size):
-                    value += across[k] * (points[near + x + step * k] - points[near + x])
-            planes[to + np.uint64(x) * Y] = value
-
-
-@helper
-def load_line(planes, p, points, beyond, i, size, across, begin, end):
-    """Put columns begin..end of row i of the points, or of the one beyond either end, into planes p."""
-    width = np.uint64(end - begin)
-    if 0 <= size * i < points.size:
-        load_row(planes, p, points, np.uint64(size * i + 3 * begin), width)
-        load_ends(planes, p, points, size * i, size, across, begin, end)
-    else:
-        first = 0 if i < 0 else size
-        load_row(planes, p, beyond, np.uint64(first + 3 * begin), width)
-        load_ends(planes, p, beyond, first, size, across, begin, end)
-
-
-@inlined
 def diagonals(planes, p, q, i):
-    """Diagonals of the quad whose first two vertices are at i in rows p and q, the others beside them."""
-    return apart(planes, q + i + ONE, planes, p + i, Y), apart(planes, p + i + ONE, planes, q + i, Y)
+    """Of the quad whose first two vertices are at i in rows p and q, the others beside them."""
+    return apart(planes, q + i + 1, planes, p + i, Y), apart(planes, p + i + 1, planes, q + i, Y)
 
 
-@helper
-def first_sums(planes, p, q, part, liu, width):
-    """Begin the sums of the vertices in row q with the quads between rows p and q."""
-    wide()
-    u, v = diagonals(planes, p, q, FIRST - ONE)
-    n, before = unit(cross(u, v))
-    (gx, gy, gz), _ = fluxes(u, v, n)
-    for i in range(FIRST, FIRST + width):
-        u, v = diagonals(planes, p, q, i)
-        n, length = unit(cross(u, v))
-        (hx, hy, hz), (fx, fy, fz) = fluxes(u, v, n)
-        place(part, i, Y, (fx - gx, fy - gy, fz - gz))
-        if liu is not None:
-            part[i + A] = length + before
-        gx, gy, gz, before = hx, hy, hz, length
-
-
-@helper
+@formula
 def first_quad(planes, p, q, work):
     """The quad before the first one of a row."""
-    u, v = diagonals(planes, p, q, FIRST - ONE)
-    n, work[FIRST - ONE + LENGTH] = unit(cross(u, v))
-    place(work, FIRST - ONE, S, n)
+    u, v = diagonals(planes, p, q, FIRST - 1)
+    n, work[FIRST - 1 + LENGTH] = unit(cross(u, v))
+    place(work, FIRST - 1 + NORMAL, S, n)
 
 
-@helper
-def row_normals(planes, o, p, q, work, liu, H, normal, g, width):
-    """Diagonals and normals of the quads between rows p and q, normals of the rings around row p.
+@formula
+def last_quad(work):
+    """Make the last quad of a stretch the one before the next stretch."""
+    for plane in (NORMAL, NORMAL + S, NORMAL + 2 * S, LENGTH):
+        work[plane + FIRST - 1] = work[plane + FIRST + STRETCH - 1]
 
-    As all that follows of a stretch of `width` columns, from column g on.
-    """
-    wide()
-    for k in range(np.uint64(0), width):
+
+def normals(planes, o, p, q, work, g, ring):
+    """Diagonals and normals of quads; with `ring` squares of the rings' normals, with 2 these too."""
+    for k in span(0, STRETCH):
         i, j = FIRST + g + k, FIRST + k
         u, v = diagonals(planes, p, q, i)
         place(work, j + U, S, u)
         place(work, j + V, S, v)
-        place(work, j, S, cross(u, v))
-        a = apart(planes, q + i, planes, o + i, Y)
-        b = apart(planes, p + i + ONE, planes, p + i - ONE, Y)
-        ring_normal(work, j + RING, S, a, b, liu, H, normal)
+        place(work, j + NORMAL, S, cross(u, v))
+        if ring:
+            a = apart(planes, q + i, planes, o + i, Y)
+            b = apart(planes, p + i + 1, planes, p + i - 1, Y)
+            n = cross(a, b)
+            work[j + SQUARE] = dot(n, n)
+            if ring == 2:
+                place(work, j + RING, S, n)
 
 
-@helper
-def row_scales(work, part, liu, H, normal, area, at, g, width):
-    """Normals of quads made of length one, in Liu's formula their lengths summed; see `flux_scale`."""
-    wide()
-    before = work[FIRST - ONE + LENGTH]
-    for k in range(np.uint64(0), width):
-        j, lengths = FIRST + k, 0.0
-        n, length = unit(triple(work, j, S))
-        place(work, j, S, n)
-        if liu is not None:
-            i, both = j + g, length + before
-            lengths = part[i + A] + both
-            part[i + A] = both
-            work[j + LENGTH] = before = length
-        flux_scale(work, j + RING, S, lengths, liu, H, normal, area, at + k)
+@formula
+def quad_normals(planes, p, q, work, g):
+    """As `normals`, of no rings."""
+    normals(planes, None, p, q, work, g, 0)
 
 
-@helper
-def row_curvatures(planes, p, q, work, part, Hn, H, at, g, width):
-    """Finish the vertices of row p; begin those of row q.
+@formula
+def quad_normals_ring_squares(planes, o, p, q, work, g):
+    """As `normals`, without those of rings."""
+    normals(planes, o, p, q, work, g, 1)
 
-    A row of quads adds to two rows of vertices. The sums of the upper one are finished and written in the
-    same loop; those of the lower one wait in `part` for the next row of quads.
-    """
-    wide()
-    u, v = diagonals(planes, p, q, FIRST + g - ONE)
-    (gx, gy, gz), (ex, ey, ez) = fluxes(u, v, triple(work, FIRST - ONE, S))
-    for k in range(np.uint64(0), width):
+
+@formula
+def quad_and_ring_normals(planes, o, p, q, work, g):
+    """As `normals`."""
+    normals(planes, o, p, q, work, g, 2)
+
+
+@formula
+def finite_volume_scales(work):
+    """Make normals of quads of length one; scales from the squares of the rings' normals."""
+    for j in span(FIRST, FIRST + STRETCH, 4):
+        work[j + SCALE] = ring_scale(work[j + SQUARE])
+        n, _ = unit(triple(work, j + NORMAL, S))
+        place(work, j + NORMAL, S, n)
+
+
+@formula
+def liu_scales(work, part, g):
+    """Make normals of quads of length one; scales from the lengths that they had."""
+    before = Carried((work[FIRST - 1 + LENGTH],))
+    for k in span(0, STRETCH, 4):
+        i, j = FIRST + g + k + ROW, FIRST + k
+        n, length = unit(triple(work, j + NORMAL, S))
+        place(work, j + NORMAL, S, n)
+        both = length + before.get()[0]
+        before.set((length,))
+        lengths = part[i] + both
+        part[i] = both
+        work[j + AREA] = lengths
+        work[j + SCALE] = quads_scale(lengths)
+    work[FIRST + STRETCH - 1 + LENGTH] = before.get()[0]
+
+
+@formula
+def ring_scales(work):
+    """What gives the normals of rings length one."""
+    for j in span(FIRST, FIRST + STRETCH, 4):
+        work[j + RING_SCALE] = ring_scale(work[j + SQUARE])
+
+
+def sums(planes, p, q, work, part, g, width):
+    """Curvature normals of the vertices of row p; the sums of those of row q begin."""
+    u, v = diagonals(planes, p, q, FIRST + g - 1)
+    first, second = fluxes(u, v, triple(work, FIRST - 1 + NORMAL, S))
+    before = Carried((*first, *second))
+    for k in span(0, width, 4):
         i, j = FIRST + g + k, FIRST + k
         u, v = triple(work, j + U, S), triple(work, j + V, S)
-        (hx, hy, hz), (fx, fy, fz) = fluxes(u, v, triple(work, j, S))
-        tx = part[i] + (hx - ex)
-        ty = part[i + Y] + (hy - ey)
-        tz = part[i + Z] + (hz - ez)
-        place(part, i, Y, (fx - gx, fy - gy, fz - gz))
-        gx, gy, gz, ex, ey, ez = hx, hy, hz, fx, fy, fz
-        store_curvature((tx, ty, tz), work, j + RING, S, Hn, H, at + k)
+        first, second = fluxes(u, v, triple(work, j + NORMAL, S))
+        others = before.get()
+        before.set((*first, *second))
+        t = plus(triple(part, i, Y), less(first, others[3:]))
+        place(part, i, Y, less(second, others[:3]))
+        yield k, times(t, work[j + SCALE])
 
 
-@helper
-def last_quad(work, first, width):
-    """Make the last normal and length of a stretch those before the next one."""
-    for x in (np.uint64(0), S, TWO * S, LENGTH):
-        work[first + x - ONE] = work[first + x + width - ONE]
+@formula
+def row_vectors(planes, p, q, work, part, unwanted, Hn, wanted, g, at, width):
+    """Write the curvature normals of row p from vertex number `at` on, unless they are not wanted."""
+    Hn, at = where(wanted, Hn, unwanted), where(wanted, at, 0)
+    for k, h in sums(planes, p, q, work, part, g, width):
+        place(Hn, 3 * (at + k), 1, h)
+
+
+def ring_normal(work, scale, k):
+    """Unit normal of the k-th ring of a stretch."""
+    return times(triple(work, FIRST + k + RING, S), work[FIRST + k + scale])
+
+
+@formula
+def row_curvatures(planes, p, q, work, part, scale, H, g, at, width):
+    """Write the curvatures of row p from vertex number `at` on."""
+    for k, h in sums(planes, p, q, work, part, g, width):
+        H[at + k] = -dot(h, ring_normal(work, scale, k))
+
+
+@formula
+def vector_curvatures(work, scale, Hn, H, at, width):
+    """Write curvatures where their vectors have been written."""
+    for k in span(0, width):
+        H[at + k] = -dot(triple(Hn, 3 * (at + k), 1), ring_normal(work, scale, k))
+
+
+@formula
+def unit_normals(work, scale, normal, at, width):
+    """Write normals."""
+    for k in span(0, width):
+        place(normal, 3 * (at + k), 1, ring_normal(work, scale, k))
+
+
+@formula
+def dual_areas(work, liu, area, at, width):
+    """Write dual areas."""
+    for k in span(0, width):
+        j = FIRST + k
+        area[at + k] = where(liu, quads_area(work[j + AREA]), ring_area(work[j + SQUARE]))
+
+
+@formula
+def ask(values, begin):
+    """Ask for the memory of a stretch of points."""
+    for k in range(0, STRETCH, 8):
+        prefetch(values, begin + k)
+
+
+@formula
+def ask_to_write(values, begin):
+    """Ask for the memory of a stretch of results."""
+    for k in range(0, STRETCH, 8):
+        prefetch(values, begin + k, write=True)
 
 
 @kernel
-def grid_curvatures(points, beyond, across, liu, Hn, H, normal, area, start, stop):
+def _pass(points, size, beyond, beside, liu, Hn, H, normal, area, start, stop, planes, part, work, unwanted):
+    # No array is made or chosen inside the loops: counting who holds it would wait for all that is being
+    # written. An array of size 0 is a result that nobody wants.
+    c, rows = beyond.size // 6, beside.size // 6
+    vectors, numbers, normals, areas = Hn.size > 0, H.size > 0, normal.size > 0, area.size > 0
+    scale = RING_SCALE if liu else SCALE
+    for begin in range(0, c, WIDTH):
+        end = min(begin + WIDTH, c)
+        o, p, q, fresh = 0, ROW, 2 * ROW, 3 * ROW
+        for i in range(start - 3, stop):
+            ahead, wanted = min(i + 2, stop), i >= start  # the row that is loaded; whether there are results
+            inside = 0 <= ahead < rows - 2
+            first = size * ahead if inside else 0 if ahead < 0 else 3 * c
+            for left in range(begin, end, STRETCH):
+                right = min(left + STRETCH, end)
+                g, at, width = left - begin, i * c + left, right - left
+                load_row(planes, fresh + FIRST + g, points, beyond, inside, first + 3 * left, width)
+                if i < start - 1:
+                    continue
+                if left == begin:
+                    first_quad(planes, p, q, work)
+                # As the work on this stretch goes on, the next one arrives; all of it at once would have to
+                # be waited for.
+                for third in range(3):
+                    ask(points, first + 3 * right + STRETCH * third)
+                    if vectors:
+                        ask_to_write(Hn, 3 * (at + width) + STRETCH * third)
+                    if normals:
+                        ask_to_write(normal, 3 * (at + width) + STRETCH * third)
+                    if third == 0:
+                        if numbers:
+                            ask_to_write(H, at + width)
+                        if not wanted or (liu and not (numbers or normals)):
+                            quad_normals(planes, p, q, work, g)
+                        elif numbers or normals:
+                            quad_and_ring_normals(planes, o, p, q, work, g)
+                        else:
+                            quad_normals_ring_squares(planes, o, p, q, work, g)
+                    elif third == 1:
+                        if areas:
+                            ask_to_write(area, at + width)
+                        if liu:
+                            liu_scales(work, part, g)
+                            if numbers or normals:
+                                ring_scales(work)
+                        else:
+                            finite_volume_scales(work)
+                    elif vectors or not wanted:
+                        row_vectors(planes, p, q, work, part, unwanted, Hn, wanted, g, at, width)
+                        if numbers and wanted:
+                            vector_curvatures(work, scale, Hn, H, at, width)
+                    elif numbers:
+                        row_curvatures(planes, p, q, work, part, scale, H, g, at, width)
+                last_quad(work)
+                if wanted and normals:
+                    unit_normals(work, scale, normal, at, width)
+                if wanted and areas:
+                    dual_areas(work, liu, area, at, width)
+            to, row = fresh + FIRST, ahead + 1
+            load_end(planes, to - 1, points, beyond, beside, inside, begin > 0, first + 3 * begin - 3, row)
+            load_end(
+                planes,
+                to + end - begin,
+                points,
+                beyond,
+                beside,
+                inside,
+                end < c,
+                first + 3 * end,
+                rows + row,
+            )
+            o, p, q, fresh = p, q, fresh, o
+
+
+def grid_curvatures(points, size, beyond, beside, liu, Hn, H, normal, area, start, stop):
     """Mean curvature normal, mean curvature, unit normal and dual area of the vertices of rows start..stop.
 
     Parameters
     ----------
-    points : (3 r c,) float64
-        Vertices, row by row.
+    points : float64
+        Vertices, row by row, rows `size` numbers apart.
+    size : int
     beyond : (6 c,) float64
         The rows before the first one and after the last one.
-    across : (k,) float64
-        How rows go on: the point before the first one is x_0 + sum of across_k (x_k - x_0), that after the
-        last one alike. Empty: rows are closed, and these are the last and the first one.
-    liu : 0 or None
-        None: the finite-volume scheme.
-    Hn, normal : (3 r c,) float64 or None
-        Written to, unless None; a version for each choice of None is compiled as it is called for.
-    H, area : (r c,) float64 or None
+    beside : (6 (r + 2),) float64
+        The columns before the first one and after the last one, those of the rows of `beyond` too.
+    liu : bool
+        Dual areas of Liu's formula, not those of the finite-volume scheme.
+    Hn, normal : (3 r c,) float64
+        Written to; of size 0 where they are not wanted.
+    H, area : (r c,) float64
+        As these.
     start, stop : int
     """
-    # No array is made inside the loops: counting who holds it would wait for all that is being written.
-    c = beyond.size // 6
-    room = aligned(16 * STRIDE + 14 * SHORT)
-    planes, part, work = room[: 12 * STRIDE], room[12 * STRIDE : 16 * STRIDE], room[16 * STRIDE :]
-    for begin in range(0, c, WIDTH):
-        end = min(begin + WIDTH, c)
-        o, p, q, fresh = np.uint64(0), THREE * Y, THREE * Z, THREE * A
-        load_line(planes, o, points, beyond, start - 1, 3 * c, across, begin, end)
-        load_line(planes, p, points, beyond, start, 3 * c, across, begin, end)
-        load_line(planes, q, points, beyond, start + 1, 3 * c, across, begin, end)
-        first_sums(planes, o, p, part, liu, np.uint64(end - begin))
-        for i in range(start, stop):
-            ahead = min(i + 2, stop)  # the row that is loaded
-            inside = 3 * c * ahead < points.size
-            first = 3 * c * ahead if inside else 3 * c
-            first_quad(planes, p, q, work)
-            for left in range(begin, end, STRETCH):
-                right = min(left + STRETCH, end)
-                g, at, width = np.uint64(left - begin), np.uint64(i * c + left), np.uint64(right - left)
-                prefetch_stretch(points, first + 3 * right, Hn, H, normal, area, i * c + right, 0)
-                row_normals(planes, o, p, q, work, liu, H, normal, g, width)
-                prefetch_stretch(points, first + 3 * right, Hn, H, normal, area, i * c + right, 1)
-                if inside:
-                    load_row(planes, fresh + g, points, np.uint64(first + 3 * left), width)
-                else:
-                    load_row(planes, fresh + g, beyond, np.uint64(first + 3 * left), width)
-                row_scales(work, part, liu, H, normal, area, at, g, width)
-                prefetch_stretch(points, first + 3 * right, Hn, H, normal, area, i * c + right, 2)
-                row_curvatures(planes, p, q, work, part, Hn, H, at, g, width)
-                last_quad(work, FIRST, width)
-            if inside:
-                load_ends(planes, fresh, points, first, 3 * c, across, begin, end)
-            else:
-                load_ends(planes, fresh, beyond, first, 3 * c, across, begin, end)
-            o, p, q, fresh = p, q, fresh, o
+    _pass(points, size, beyond, beside, liu, Hn, H, normal, area, start, stop, *rooms(ROOMS))

@@ -8,14 +8,41 @@ from functools import partial
 import numpy as np
 
 from quadcurv.kernels import ranges
-from quadcurv.kernels.compiled import helper, kernel, prefetch
+from quadcurv.kernels.compiled import flat, kernel
+from quadcurv.kernels.formulas import formula, prefetch, where
 
 ISOLATED, INTERIOR, BOUNDARY, SEVERAL_FANS, NONMANIFOLD = 0, 1, 2, 3, 4
 FAR = 10_000  # vertices between neighbours in memory, on average, that are in no cache
 AHEAD = 16  # faces or vertices: where what is read next lies far apart, it is asked for that early
 
 
+@formula
+def checked_face(given, f, sides, n, faces):
+    """Copy a face; whether an index is outside, whether a vertex is repeated."""
+    h, i, j = (given[sides * f + s] for s in range(3))
+    k = where(sides == 4, given[sides * f + sides - 1], -1)
+    for s, v in enumerate((h, i, j, k)):
+        faces[4 * f + s] = v
+    outside = (k < -1) | (k >= n)
+    for v in (h, i, j):
+        outside = outside | (v < 0) | (v >= n)
+    return outside, (h == i) | (i == j) | (j == h) | (k == h) | (k == i) | (k == j)
+
+
 @kernel
+def _checked(given, sides, n, faces):
+    outside, n_outside, repeated, n_repeated = -1, 0, -1, 0
+    for f in range(faces.size // 4):
+        is_outside, is_repeated = checked_face(given, f, sides, n, faces)
+        if is_outside:
+            outside = f if n_outside == 0 else outside
+            n_outside += 1
+        if is_repeated:
+            repeated = f if n_repeated == 0 else repeated
+            n_repeated += 1
+    return outside, n_outside, repeated, n_repeated
+
+
 def checked(given, n, faces):
     """Copy (m, 3 or 4) faces to (m, 4) int32, -1 being added to triangles, and look for bad ones.
 
@@ -24,120 +51,124 @@ def checked(given, n, faces):
     (first, count), (first, count)
         Faces with an index outside 0..n - 1, and faces with a repeated vertex.
     """
-    outside, n_outside, repeated, n_repeated = -1, 0, -1, 0
-    for f in range(given.shape[0]):
-        h, i, j = given[f, 0], given[f, 1], given[f, 2]
-        k = given[f, 3] if given.shape[1] == 4 else -1
-        faces[f, 0], faces[f, 1], faces[f, 2], faces[f, 3] = h, i, j, k
-        if min(h, i, j) < 0 or k < -1 or max(h, i, j, k) >= n:
-            outside = f if n_outside == 0 else outside
-            n_outside += 1
-        if h == i or i == j or j == h or k in (h, i, j):
-            repeated = f if n_repeated == 0 else repeated
-            n_repeated += 1
-    return (outside, n_outside), (repeated, n_repeated)
+    found = _checked(flat(given), given.shape[1], n, faces.ravel())
+    return found[:2], found[2:]
 
 
 @kernel
-def corners_by_vertex(faces, n):
-    """Counting sort of all corners by their vertex: (indptr, corners)."""
-    indptr = np.zeros(n + 1, np.int64)
-    for f in range(faces.shape[0]):
-        for s in range(4):
-            if faces[f, s] >= 0:
-                indptr[faces[f, s] + 1] += 1
+def _corners_by_vertex(faces, indptr, corners):
+    for c in range(faces.size):
+        if faces[c] >= 0:
+            indptr[faces[c] + 1] += 1
+    n = indptr.size - 1
     for i in range(n):
         indptr[i + 1] += indptr[i]
-    corners = np.empty(indptr[n], np.int32)
     # indptr itself counts up where the next corner goes, and so ends up one vertex ahead.
-    for f in range(faces.shape[0]):
-        for s in range(4):
-            v = faces[f, s]
-            if v >= 0:
-                corners[indptr[v]] = 4 * f + s
-                indptr[v] += 1
+    for c in range(faces.size):
+        v = faces[c]
+        if v >= 0:
+            corners[indptr[v]] = c
+            indptr[v] += 1
     for i in range(n, 0, -1):
         indptr[i] = indptr[i - 1]
     indptr[0] = 0
-    return indptr, corners
 
 
-@kernel
+def corners_by_vertex(faces, n):
+    """Counting sort of all corners by their vertex: (indptr, corners)."""
+    indptr, corners = np.zeros(n + 1, np.int64), np.empty(faces.size, np.int32)
+    _corners_by_vertex(flat(faces), indptr, corners)
+    return indptr, corners[: indptr[-1]]
+
+
 def mean_distance(faces):
     """Mean distance in memory of a face's first two vertices, in vertices; of every 16th face."""
-    total = count = 0
-    for f in range(0, faces.shape[0], 16):
-        total += abs(faces[f, 1] - faces[f, 0])
-        count += 1
-    return total / max(count, 1)
+    return float(np.abs(np.diff(faces[::16, :2])).mean()) if len(faces) else 0.0
+
+
+@formula
+def ask(values, index):
+    """Ask for the memory of an entry."""
+    prefetch(values, index)
+
+
+@formula
+def ask_corners(faces, f, ring, valence):
+    """Ask for what belongs to the vertices of a face."""
+    for s in range(4):
+        v = faces[4 * f + s]
+        prefetch(ring, 8 * v)
+        prefetch(valence, v)
+
+
+@formula
+def first_corner(faces, c, ring, valence):
+    """Put a corner into the row of its vertex, after those that it has; more than five are not counted."""
+    v = faces[c]
+    count = valence[v]
+    ring[8 * v + count] = c
+    valence[v] = where(count < 5, count + 1, 5)
 
 
 @kernel
 def first_corners(faces, far, ring, valence):
     """Put the first four corners of every vertex into its row of `ring`, and count them as far as five."""
-    for f in range(faces.shape[0]):
-        if far and f + AHEAD < faces.shape[0]:
-            for s in range(4):
-                v = max(faces[f + AHEAD, s], 0)
-                prefetch(ring, 8 * v)
-                prefetch(valence, v)
-        for s in range(4):
-            v = faces[f, s]
-            if v >= 0 and valence[v] < 5:
-                if valence[v] < 4:
-                    ring[v, valence[v]] = 4 * f + s
-                valence[v] += 1
+    for f in range(faces.size // 4):
+        if far and f + AHEAD < faces.size // 4:
+            ask_corners(faces, f + AHEAD, ring, valence)
+        for c in range(4 * f, 4 * f + 4):
+            if faces[c] >= 0:
+                first_corner(faces, c, ring, valence)
+
+
+@formula
+def regular_ring(faces, ring, v):
+    """Turn the first four corners of a vertex into its ring; -1 first if they have none."""
+    around = []
+    for k in range(4):
+        corner = ring[8 * v + k]
+        f, s = corner >> 2, corner & 3
+        following, diagonal, previous = (faces[4 * f + ((s + i) & 3)] for i in (1, 2, 3))
+        around.append((following, diagonal, previous, faces[4 * f + 3] >= 0))
+    first, diagonal, end, regular = around[0]
+    found = [first, diagonal]
+    for _ in range(3):
+        (a, *one), (b, *two), (c, *three) = around[1:]
+        diagonal, following, quad = (
+            where(a == end, x, where(b == end, y, z)) for x, y, z in zip(one, two, three, strict=True)
+        )
+        regular = regular & quad & (end != first) & ((a == end) | (b == end) | (c == end))
+        found += [end, diagonal]
+        end = following
+    regular = regular & (end == first)
+    for k in range(1, 8, 2):
+        for j in range(8):
+            if j != k:
+                regular = regular & (found[j] != found[k])
+    for j, x in enumerate(found):
+        ring[8 * v + j] = where(regular, x, -1) if j == 0 else x
 
 
 @kernel
-def regular_rings(faces, far, valence, ring, start, stop):
-    """Rings (a, d, a, d, ...) of vertices start..stop inside four quads that run the same way round.
-
-    Counter-clockwise from the first corner, eight vertices, where `first_corners` has put corners. A first
-    entry of -1 marks all other vertices.
-    """
-    corners = np.empty(4, np.int32)
+def _regular_rings(faces, far, valence, ring, start, stop):
     for v in range(start, stop):
         if far and v + AHEAD < stop and valence[v + AHEAD] == 4:
             for k in range(4):
-                prefetch(faces, ring[v + AHEAD, k])
-        if valence[v] != 4:
-            ring[v, 0] = -1
-            continue
-        for k in range(4):
-            corners[k] = ring[v, k]
-        ring[v, 0] = -1
-        f, s = corners[0] >> 2, corners[0] & 3
-        first, exit_ = faces[f, (s + 1) & 3], faces[f, (s + 3) & 3]
-        ring[v, 1] = faces[f, (s + 2) & 3]
-        ok = faces[f, 3] >= 0
-        for turn in range(1, 4):
-            found = False
-            for k in range(1, 4):
-                f, s = corners[k] >> 2, corners[k] & 3
-                if faces[f, (s + 1) & 3] == exit_:
-                    found = faces[f, 3] >= 0
-                    break
-            if not found or exit_ == first:
-                ok = False
-                break
-            ring[v, 2 * turn], ring[v, 2 * turn + 1] = exit_, faces[f, (s + 2) & 3]
-            exit_ = faces[f, (s + 3) & 3]
-        if not ok or exit_ != first:
-            continue
-        ring[v, 0] = first
-        for k in range(1, 8, 2):
-            for j in range(8):
-                ok &= j == k or ring[v, j] != ring[v, k]
-        if not ok:
-            ring[v, 0] = -1
+                ask(faces, 4 * (ring[8 * (v + AHEAD) + k] >> 2))
+        if valence[v] == 4:
+            regular_ring(faces, ring, v)
+        else:
+            ring[8 * v] = -1
 
 
 def rings(faces, n):
-    """Ring (n, 8) int32 of every vertex, see `regular_rings`."""
+    """Rings (a, d, a, d, ...) of vertices inside four quads that run the same way round, (n, 8) int32.
+
+    Counter-clockwise from the first corner. A first entry of -1 marks all other vertices.
+    """
     ring, valence, far = np.empty((n, 8), np.int32), np.zeros(n, np.uint8), mean_distance(faces) > FAR
-    first_corners(faces, far, ring, valence)
-    ranges.over(partial(regular_rings, faces, far, valence, ring), n, n)
+    first_corners(flat(faces), far, ring.ravel(), valence)
+    ranges.over(partial(_regular_rings, flat(faces), far, flat(valence), ring.ravel()), n, n)
     return ring
 
 
@@ -147,7 +178,7 @@ def fans(faces, n):
     Returns
     -------
     ring : (n, 8) int32
-        See `regular_rings`. Where four quads run the same way round there is nothing to reject or to turn.
+        See `rings`. Where four quads run the same way round there is nothing to reject or to turn.
     others : (k,) int64
         Vertices without such a ring.
     kind, bad_edge, n_disagree
@@ -167,24 +198,35 @@ def fans(faces, n):
     return ring, others, kind, bad_edge, n_disagree
 
 
+@formula
+def is_near(faces, f, level, step):
+    """Whether a vertex of a face is at most `step` steps away."""
+    a, b, c, d = (level[faces[4 * f + s]] <= step for s in (0, 1, 2, where(faces[4 * f + 3] < 0, 0, 3)))
+    return a | b | c | d
+
+
+@formula
+def spread(faces, f, level, step):
+    """The vertices of a face are one step further at most."""
+    for s in (0, 1, 2, where(faces[4 * f + 3] < 0, 0, 3)):
+        v = faces[4 * f + s]
+        level[v] = where(level[v] > step, step + 1, level[v])
+
+
 @kernel
+def _surroundings(faces, level, reach, kept):
+    for step in range(reach):
+        for f in range(kept.size):
+            if not kept[f] and is_near(faces, f, level, step):
+                kept[f] = True
+                spread(faces, f, level, step)
+
+
 def surroundings(faces, vertices, n, reach):
     """Faces that one comes to from the vertices in `reach` steps from face to face, in their order."""
-    level = np.full(n, reach, np.uint8)
-    for v in vertices:
-        level[v] = 0
-    kept = np.zeros(faces.shape[0], np.bool_)
-    for step in range(reach):
-        for f in range(faces.shape[0]):
-            if kept[f]:
-                continue
-            sides = 3 if faces[f, 3] < 0 else 4
-            for s in range(sides):
-                if level[faces[f, s]] <= step:
-                    kept[f] = True
-            if kept[f]:
-                for s in range(sides):
-                    level[faces[f, s]] = min(level[faces[f, s]], step + 1)
+    level, kept = np.full(n, reach, np.uint8), np.zeros(len(faces), bool)
+    level[vertices] = 0
+    _surroundings(flat(faces), level, reach, kept)
     return np.flatnonzero(kept)
 
 
@@ -200,15 +242,72 @@ def part_around(faces, vertices, n, reach):
     return kept, place[near]
 
 
-@helper
-def neighbours(faces, corner):
-    """Next and previous edge neighbour of the vertex at a corner."""
-    f, s = corner // 4, corner % 4
-    sides = 3 if faces[f, 3] < 0 else 4
-    return faces[f, (s + 1) % sides], faces[f, (s + sides - 1) % sides]
+@formula
+def neighbour(faces, corner, previous):
+    """Next or previous edge neighbour of the vertex at a corner."""
+    f, s = corner >> 2, corner & 3
+    last = where(faces[4 * f + 3] < 0, 2, 3)
+    ahead, behind = where(s == last, 0, s + 1), where(s == 0, last, s - 1)
+    return faces[4 * f + where(previous, behind, ahead)]
 
 
 @kernel
+def _order_rings(faces, indptr, corners, vertices, kind, flipped, bad_edge, seen, found, turns):
+    # One entry a neighbour, stamped with the vertex at hand: a pole costs O(valence), not its square.
+    n = kind.size
+    stamp, first, second, count, role = 0, n, 2 * n, 3 * n, 4 * n  # a first corner's role: whether "previous"
+    disagree = 0
+    for v in vertices:
+        begin, end = indptr[v], indptr[v + 1]
+        valence = end - begin
+        if valence == 0:
+            kind[v] = ISOLATED
+            continue
+        for k in range(begin, end):
+            for r in range(2):
+                x = neighbour(faces, corners[k], r == 1)
+                if seen[stamp + x] != v:
+                    seen[stamp + x], seen[first + x], seen[second + x] = v, k, -1
+                    seen[count + x], seen[role + x] = 1, r
+                    continue
+                seen[count + x] += 1
+                seen[second + x] = k
+                if seen[count + x] == 2:
+                    if v < x and seen[role + x] == r:
+                        disagree += 1
+                elif seen[count + x] == 3 and v < x:
+                    if bad_edge[2] == 0:
+                        bad_edge[0], bad_edge[1] = v, x
+                    bad_edge[2] += 1
+        start, flip = begin, False
+        for k in range(begin, end):
+            if seen[count + neighbour(faces, corners[k], False)] == 1:
+                start, flip = k, False
+                break
+            if seen[count + neighbour(faces, corners[k], True)] == 1:
+                start, flip = k, True
+        used, k, closed = 0, start, False
+        while used < valence:
+            found[used], turns[used] = corners[k], flip
+            used += 1
+            x = neighbour(faces, corners[k], not flip)
+            other = seen[second + x] if seen[first + x] == k else seen[first + x]
+            if other < 0 or seen[count + x] > 2:
+                break
+            if other == start:
+                closed = True
+                break
+            k, flip = other, neighbour(faces, corners[other], False) != x
+        if used < valence:
+            kind[v] = SEVERAL_FANS
+            continue
+        kind[v] = INTERIOR if closed else BOUNDARY
+        for i in range(valence):
+            corners[begin + i] = found[i]
+            flipped[begin + i] = turns[i]
+    return disagree
+
+
 def order_rings(faces, indptr, corners, vertices):
     """Sort the corners of some vertices in place into fans, counter-clockwise from a boundary if any.
 
@@ -223,81 +322,23 @@ def order_rings(faces, indptr, corners, vertices):
     n_disagree : int
         Interior edges whose two faces run the same way along them.
     """
-    n = indptr.size - 1
-    kind = np.full(n, INTERIOR, np.uint8)
-    flipped = np.zeros(corners.size, np.bool_)
-    bad_edge = np.array([-1, -1, 0])
-    n_disagree = 0
-    # One entry a neighbour, stamped with the vertex at hand: a pole costs O(valence), not its square.
-    stamp = np.full(n, -1, np.int32)
-    first = np.empty(n, np.int64)
-    second = np.empty(n, np.int64)
-    count = np.empty(n, np.int64)
-    role = np.empty(n, np.int64)  # of the first corner's: 0 where it is "next", 1 where "previous"
-    for v in vertices:
-        begin, end = indptr[v], indptr[v + 1]
-        valence = end - begin
-        if valence == 0:
-            kind[v] = ISOLATED
-            continue
-        for k in range(begin, end):
-            for r, x in enumerate(neighbours(faces, corners[k])):
-                if stamp[x] != v:
-                    stamp[x], first[x], second[x], count[x], role[x] = v, k, -1, 1, r
-                    continue
-                count[x] += 1
-                second[x] = k
-                if count[x] == 2:
-                    n_disagree += v < x and role[x] == r
-                elif count[x] == 3 and v < x:
-                    if bad_edge[2] == 0:
-                        bad_edge[0], bad_edge[1] = v, x
-                    bad_edge[2] += 1
-        start, flip = begin, False
-        for k in range(begin, end):
-            a, b = neighbours(faces, corners[k])
-            if count[a] == 1:
-                start, flip = k, False
-                break
-            if count[b] == 1:
-                start, flip = k, True
-        ring = np.empty(valence, np.int64)
-        turned = np.empty(valence, np.bool_)
-        used, k, closed = 0, start, False
-        while used < valence:
-            ring[used], turned[used] = corners[k], flip
-            used += 1
-            a, b = neighbours(faces, corners[k])
-            exit_ = a if flip else b
-            other = second[exit_] if first[exit_] == k else first[exit_]
-            if other < 0 or count[exit_] > 2:
-                break
-            if other == start:
-                closed = True
-                break
-            k, flip = other, neighbours(faces, corners[other])[0] != exit_
-        if used < valence:
-            kind[v] = SEVERAL_FANS
-            continue
-        kind[v] = INTERIOR if closed else BOUNDARY
-        for i in range(valence):
-            corners[begin + i] = ring[i]
-            flipped[begin + i] = turned[i]
+    n, most = indptr.size - 1, int(np.diff(indptr).max(initial=0))
+    kind, flipped, bad_edge = (
+        np.full(n, INTERIOR, np.uint8),
+        np.zeros(corners.size, bool),
+        np.array([-1, -1, 0]),
+    )
+    seen = np.full(5 * n, -1, np.int64)
+    found, turns = np.empty(most, np.int64), np.empty(most, bool)
+    n_disagree = _order_rings(
+        flat(faces), flat(indptr), corners, flat(vertices), kind, flipped, bad_edge, seen, found, turns
+    )
     return kind, flipped, bad_edge, n_disagree
 
 
 @kernel
-def colour(faces, indptr, corners, n):
-    """Colour vertices 0..n-1, no two along an edge of a quad alike; -1 for all others.
-
-    Greedy in breadth-first order, which gives two colours wherever two suffice.
-    """
-    colours = np.full(indptr.size - 1, -1, np.int64)
-    taken = np.full(indptr.size, -1, np.int64)
-    queue = np.empty(n, np.int64)
-    queued = np.zeros(n, np.bool_)
-    size = 0
-    head = 0
+def _colour(faces, indptr, corners, colours, taken, queue, queued):
+    n, size, head = queue.size, 0, 0
     for root in range(n):
         if queued[root]:
             continue
@@ -307,9 +348,10 @@ def colour(faces, indptr, corners, n):
             v = queue[head]
             head += 1
             for k in range(indptr[v], indptr[v + 1]):
-                if faces[corners[k] // 4, 3] < 0:
+                if faces[4 * (corners[k] >> 2) + 3] < 0:
                     continue
-                for x in neighbours(faces, corners[k]):
+                for r in range(2):
+                    x = neighbour(faces, corners[k], r == 1)
                     if colours[x] >= 0:
                         taken[colours[x]] = v
                     if x < n and not queued[x]:
@@ -319,4 +361,14 @@ def colour(faces, indptr, corners, n):
             while taken[c] == v:
                 c += 1
             colours[v] = c
+
+
+def colour(faces, indptr, corners, n):
+    """Colour vertices 0..n-1, no two along an edge of a quad alike; -1 for all others.
+
+    Greedy in breadth-first order, which gives two colours wherever two suffice.
+    """
+    colours, taken = np.full(indptr.size - 1, -1, np.int64), np.full(indptr.size, -1, np.int64)
+    queue, queued = np.empty(n, np.int64), np.zeros(n, bool)
+    _colour(flat(faces), flat(indptr), flat(corners), colours, taken, queue, queued)
     return colours

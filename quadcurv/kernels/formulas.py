@@ -1,0 +1,355 @@
+"""Formulas: plain functions of numbers, tuples and arrays that become part of compiled loops.
+
+A formula runs once, while a kernel that calls it is compiled, on values that write down what is done to
+them. So it costs the compiler no more than its result: there are no types to infer and no calls to inline,
+and no index is looked at, whether it counts from the end. Given numbers and arrays a formula computes.
+
+What a formula decides by `if` and repeats by `range` is decided and repeated as it is written down; `where`
+and `span` leave it to the kernel. Arrays that a formula is given must not overlap if it writes to one.
+"""
+
+from __future__ import annotations
+
+import inspect
+from itertools import count
+
+import numpy as np
+from llvmlite import ir
+from numba import types
+from numba.core import cgutils
+from numba.extending import intrinsic
+
+_DOUBLE, _INT, _BOOL = ir.DoubleType(), ir.IntType(64), ir.IntType(1)
+_fresh = count()
+_drafts: list[_Draft] = []  # of the formulas that are being written down
+
+
+class _Draft:
+    """Where a formula is written down."""
+
+    def __init__(self, builder, arrays, contract):
+        self.builder, self.arrays, self.contract = builder, arrays, contract
+        self._scopes = []
+
+    def __enter__(self):
+        _drafts.append(self)
+        return self
+
+    def __exit__(self, *_):
+        _drafts.pop()
+
+    def marked(self, instruction, owners):
+        """A load or store that is of some of the arrays and of no other one.
+
+        The compiler, told so, need not compare addresses where a loop begins, nor keep a slow copy of it.
+        """
+        others = set(range(self.arrays)) - owners
+        if others:
+            module = self.builder.module
+            if not self._scopes:
+                domain = module.add_metadata([ir.MetaDataString(module, f"formula {next(_fresh)}")])
+                names = [ir.MetaDataString(module, f"array {next(_fresh)}") for _ in range(self.arrays)]
+                self._scopes = [module.add_metadata([name, domain]) for name in names]
+            for kind, chosen in (("alias.scope", owners), ("noalias", others)):
+                scopes = [self._scopes[i] for i in sorted(chosen)]
+                instruction.set_metadata(kind, module.add_metadata(scopes))
+        return instruction
+
+
+class _Value:
+    """A value of the code that is written down."""
+
+    def __init__(self, value):
+        self.value = value
+
+    __hash__ = None
+
+    def __bool__(self):
+        raise TypeError("a formula is written down before its values are known: use where, not if")
+
+    @classmethod
+    def of(cls, x):
+        """What x is in the code, a constant where it is a number; None if it is of another kind."""
+        if isinstance(x, cls):
+            return x.value
+        return ir.Constant(cls.kind, cls.number(x)) if isinstance(x, cls.numbers) else None
+
+
+def _operator(instruction, swapped=False):
+    def operate(self, other):
+        a, b = self.value, self.of(other)
+        if b is None:
+            return NotImplemented
+        a, b = (b, a) if swapped else (a, b)
+        draft = _drafts[-1]
+        flags = {"flags": ("contract",)} if draft.contract and self.kind is _DOUBLE else {}
+        return type(self)(getattr(draft.builder, instruction)(a, b, **flags))
+
+    return operate
+
+
+def _comparison(instruction, sign):
+    def compare(self, other):
+        return Truth(getattr(_drafts[-1].builder, instruction)(sign, self.value, self.of(other)))
+
+    return compare
+
+
+class Real(_Value):
+    """A float64."""
+
+    kind, number, numbers = _DOUBLE, float, (float, int)
+    __add__, __sub__, __mul__, __truediv__ = map(_operator, ("fadd", "fsub", "fmul", "fdiv"))
+    __radd__, __rsub__ = _operator("fadd", swapped=True), _operator("fsub", swapped=True)
+    __rmul__, __rtruediv__ = _operator("fmul", swapped=True), _operator("fdiv", swapped=True)
+    __lt__, __le__, __gt__, __ge__, __eq__ = (
+        _comparison("fcmp_ordered", sign) for sign in ("<", "<=", ">", ">=", "==")
+    )
+    __ne__ = _comparison("fcmp_unordered", "!=")
+
+    def __neg__(self):
+        return Real(_drafts[-1].builder.fneg(self.value))
+
+
+class Whole(_Value):
+    """An int64."""
+
+    kind, number, numbers = _INT, int, (int, np.integer)
+    __add__, __sub__, __mul__ = map(_operator, ("add", "sub", "mul"))
+    __radd__, __rsub__ = _operator("add", swapped=True), _operator("sub", swapped=True)
+    __rmul__, __rshift__, __and__ = _operator("mul", swapped=True), _operator("ashr"), _operator("and_")
+    __lt__, __le__, __gt__, __ge__, __eq__, __ne__ = (
+        _comparison("icmp_signed", sign) for sign in ("<", "<=", ">", ">=", "==", "!=")
+    )
+
+
+class Truth(_Value):
+    """A bool."""
+
+    kind, number, numbers = _BOOL, int, (bool,)
+    __and__, __or__ = _operator("and_"), _operator("or_")
+
+
+class Memory:
+    """A C-contiguous array of one dimension: one of the formula's, or a choice among several."""
+
+    def __init__(self, data, dtype, owners):
+        self.data, self.dtype, self.owners = data, dtype, owners
+
+    def address(self, index):
+        """Pointer to an entry, which need not exist."""
+        return _drafts[-1].builder.gep(self.data, [Whole.of(index)])
+
+    def __getitem__(self, index):
+        draft = _drafts[-1]
+        value = draft.marked(draft.builder.load(self.address(index)), self.owners)
+        return _written(self.dtype, value)
+
+    def __setitem__(self, index, x):
+        draft, machine = _drafts[-1], _machine(self.dtype)
+        value = _kind(self.dtype).of(x)
+        if value.type != machine:
+            value = draft.builder.trunc(value, machine)
+        draft.marked(draft.builder.store(value, self.address(index)), self.owners)
+
+
+def formula(function=None, *, contract=False):
+    """Make a plain function callable in kernels; with `contract` it may round a product and a sum at once."""
+    if function is None:
+        return lambda function: formula(function, contract=contract)
+
+    def definition(typing, *given):
+        # What it returns is told by the formula itself, written down where nobody reads it.
+        nowhere = ir.Function(ir.Module(), ir.FunctionType(ir.VoidType(), []), "nowhere")
+        with _Draft(ir.IRBuilder(nowhere.append_basic_block()), 1, contract):
+            result = _type(function(*map(_unknown, given)))
+
+        def generate(context, builder, signature, arguments):
+            with _Draft(builder, sum(isinstance(t, types.Array) for t in given), contract):
+                owners = (frozenset((i,)) for i in count())
+                values = [
+                    Memory(context.make_array(t)(context, builder, x).data, t.dtype, next(owners))
+                    if isinstance(t, types.Array)
+                    else _written(t, x)
+                    for t, x in zip(given, arguments, strict=True)
+                ]
+                return _packed(context, builder, signature.return_type, function(*values))
+
+        return result(*given), generate
+
+    parameters = inspect.signature(function).parameters.values()
+    typing = inspect.Parameter("typing", inspect.Parameter.POSITIONAL_OR_KEYWORD)
+    definition.__signature__ = inspect.Signature([typing, *parameters])
+    definition.__name__, definition.__doc__ = function.__name__, function.__doc__
+    made = intrinsic(definition)
+    made.py_func = function
+    return made
+
+
+def _kind(t):
+    """The class of values of a type of numba's."""
+    return Truth if isinstance(t, types.Boolean) else Real if isinstance(t, types.Float) else Whole
+
+
+def _machine(t):
+    """How it lies in memory."""
+    return (
+        ir.IntType(8)
+        if isinstance(t, types.Boolean)
+        else _DOUBLE
+        if t == types.float64
+        else ir.IntType(t.bitwidth)
+    )
+
+
+def _written(t, value):
+    """A value of a type of numba's as formulas see it."""
+    builder = _drafts[-1].builder
+    if isinstance(t, types.BaseTuple):
+        return tuple(map(_written, t, cgutils.unpack_tuple(builder, value)))
+    kind = _kind(t)
+    if value.type != kind.kind:
+        value = (builder.trunc if kind is Truth else builder.sext if t.signed else builder.zext)(
+            value, kind.kind
+        )
+    return kind(value)
+
+
+def _unknown(t):
+    """The same where there is no value yet."""
+    if isinstance(t, types.BaseTuple):
+        return tuple(map(_unknown, t))
+    if isinstance(t, types.Array):
+        if t.ndim != 1 or t.layout != "C":
+            raise TypeError(f"formula: expected C-contiguous arrays of one dimension, got {t}")
+        return Memory(ir.Constant(_machine(t.dtype).as_pointer(), ir.Undefined), t.dtype, frozenset())
+    return _kind(t)(ir.Constant(_kind(t).kind, ir.Undefined))
+
+
+def _type(result):
+    """Numba's type of what a formula returns."""
+    if isinstance(result, tuple):
+        return types.Tuple([_type(x) for x in result])
+    return {type(None): types.void, Real: types.float64, Whole: types.int64, Truth: types.boolean}[
+        type(result)
+    ]
+
+
+def _packed(context, builder, t, result):
+    """What a formula returns as numba wants it."""
+    if isinstance(result, tuple):
+        return context.make_tuple(
+            builder, t, [_packed(context, builder, u, x) for u, x in zip(t, result, strict=True)]
+        )
+    return context.get_dummy_value() if result is None else result.value
+
+
+def where(condition, a, b):
+    """A where a condition holds, else b: numbers, or arrays."""
+    if not isinstance(condition, Truth):
+        return a if condition else b
+    builder = _drafts[-1].builder
+    if isinstance(a, Memory):
+        return Memory(builder.select(condition.value, a.data, b.data), a.dtype, a.owners | b.owners)
+    kind = next((kind for kind in (Truth, Real) if isinstance(a, kind) or isinstance(b, kind)), Whole)
+    if isinstance(a, float) or isinstance(b, float):
+        kind = Real
+    return kind(builder.select(condition.value, kind.of(a), kind.of(b)))
+
+
+def span(start, stop, together=None):
+    """A loop of the kernel, over start..stop, by the widest vectors there are.
+
+    Compilers use half of them, since the first processors with 512 bits slowed down; but loads that take
+    the coordinates of points apart use them all the same, and then the other half of the unit stands idle.
+    With `together` so many vectors go through the loop side by side: none waits long for its own results.
+    """
+    if not _drafts:
+        yield from range(start, stop)
+        return
+    builder, module = _drafts[-1].builder, _drafts[-1].builder.module
+    if isinstance(builder.function.attributes, set):  # which knows no attribute of a single processor
+        set.add(builder.function.attributes, '"prefer-vector-width"="512"')
+    start, stop, before = Whole.of(start), Whole.of(stop), builder.block
+    body, after = builder.append_basic_block("span"), builder.append_basic_block("span.end")
+    builder.cbranch(builder.icmp_signed("<", start, stop), body, after)
+    builder.position_at_end(body)
+    index = builder.phi(_INT)
+    index.add_incoming(start, before)
+    yield Whole(index)
+    following = builder.add(index, _INT(1), flags=("nsw",))
+    index.add_incoming(following, builder.block)
+    again = builder.cbranch(builder.icmp_signed("<", following, stop), body, after)
+    if together:
+        name = ir.MetaDataString(module, "llvm.loop.interleave.count")
+        hint = module.add_metadata([name, ir.IntType(32)(together)])
+        loop = module.add_metadata([ir.MetaDataString(module, f"loop {next(_fresh)}"), hint])
+        loop.operands = (loop, hint)  # a loop's description begins with itself
+        again.set_metadata("llvm.loop", loop)
+    builder.position_at_end(after)
+
+
+class Carried:
+    """A triple or other tuple of numbers that one turn of a `span` leaves for the next."""
+
+    def __init__(self, numbers):
+        if _drafts:
+            builder = _drafts[-1].builder
+            self._places = [cgutils.alloca_once_value(builder, Real.of(x)) for x in numbers]
+        else:
+            self._numbers = numbers
+
+    def get(self):
+        """The numbers of the turn before, or those that the loop begins with."""
+        if not _drafts:
+            return self._numbers
+        return tuple(Real(_drafts[-1].builder.load(place)) for place in self._places)
+
+    def set(self, numbers):
+        """Leave other numbers."""
+        if not _drafts:
+            self._numbers = numbers
+            return
+        for place, x in zip(self._places, numbers, strict=True):
+            _drafts[-1].builder.store(Real.of(x), place)
+
+
+def _called(name, returned, arguments):
+    """A call of a function of the compiler's own."""
+    builder = _drafts[-1].builder
+    kind = ir.FunctionType(returned, [x.type for x in arguments])
+    return builder.call(cgutils.get_or_insert_function(builder.module, kind, name), arguments)
+
+
+def muladd(a, b, c):
+    """Product of a and b, plus c, rounded once where the processor can.
+
+    Left to the compiler (`contract`), it would depend on what else a loop does.
+    """
+    if not any(isinstance(x, Real) for x in (a, b, c)):
+        return a * b + c
+    return Real(_called("llvm.fmuladd.f64", _DOUBLE, [Real.of(x) for x in (a, b, c)]))
+
+
+def root(x):
+    """Square root."""
+    return Real(_called("llvm.sqrt.f64", _DOUBLE, [x.value])) if isinstance(x, Real) else np.sqrt(x)
+
+
+def less_half(bits, x):
+    """The number whose bits are these less half of those of x."""
+    if not isinstance(x, Real):
+        return (np.uint64(bits) - (np.float64(x).view(np.uint64) >> np.uint64(1))).view(np.float64)
+    builder = _drafts[-1].builder
+    half = builder.lshr(builder.bitcast(x.value, _INT), _INT(1))
+    return Real(builder.bitcast(builder.sub(_INT(bits), half), _DOUBLE))
+
+
+def prefetch(values, index, write=False):
+    """Ask for the memory of an entry of an array, which need not exist."""
+    if isinstance(values, Memory):
+        word = ir.IntType(32)
+        line = _drafts[-1].builder.bitcast(values.address(index), cgutils.voidptr_t)
+        _called(
+            "llvm.prefetch.p0", ir.VoidType(), [line, word(int(write)), word(3), word(1)]
+        )  # keep near, data

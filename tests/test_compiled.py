@@ -1,0 +1,165 @@
+"""Compiled code is kept where it can be, made again where it must be, and nothing hangs or fails over it."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import quadcurv
+
+# Half the vector areas of a square's corners, by a kernel whose formulas lie in two files.
+PROGRAM = """
+import logging, resource, signal, sys
+import numpy as np
+logging.basicConfig(level=logging.INFO, stream=sys.stdout, format="said %(name)s %(message)s")
+from quadcurv.kernels import faces
+square = np.array([(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0)], float)
+normal = np.zeros((4, 3))
+{before}
+faces.ring_normals(square, np.array([(0, 1, 2, 3)], np.int32), normal)
+print(normal[:, 2].sum())
+{after}
+"""
+
+
+class Copy:
+    """A copy of the package without compiled files."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder, self.kernels = folder, folder / "quadcurv" / "kernels"
+        shutil.copytree(
+            Path(quadcurv.__file__).parent, folder / "quadcurv", ignore=shutil.ignore_patterns("__pycache__")
+        )
+
+    def start(self, before: str = "", after: str = "", **environment: str) -> subprocess.Popen[str]:
+        program = PROGRAM.format(before=before, after=after)
+        environment = {"PYTHONPATH": str(self.folder), "PYTHONDONTWRITEBYTECODE": "1", **environment}
+        kept = {name: value for name, value in os.environ.items() if not name.startswith("NUMBA")}
+        return subprocess.Popen(
+            [sys.executable, "-c", program],
+            env={**kept, **environment},
+            cwd=self.folder,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+        )
+
+    def run(self, *given: str, **environment: str) -> tuple[float, int]:
+        """The result, and how often it was said that something is compiled."""
+        return result_of(self.start(*given, **environment))
+
+    def files(self) -> list[Path]:
+        return sorted(self.folder.rglob("*.nbc"))
+
+
+def result_of(process: subprocess.Popen[str]) -> tuple[float, int]:
+    output, errors = process.communicate(timeout=120)
+    assert process.returncode == 0, errors
+    *said, result = output.split("\n")[:-1]
+    assert all(line.startswith("said quadcurv compiling") for line in said)
+    return float(result), len(said)
+
+
+@pytest.fixture
+def copy(tmp_path):
+    return Copy(tmp_path)
+
+
+def test_an_edit_to_a_helper_in_another_file_is_seen(copy):
+    assert copy.run() == (1.0, 1)
+    (kept,) = copy.files()
+    assert copy.run() == (1.0, 0)
+    source = copy.kernels / "vector.py"
+    text = source.read_text()
+    assert "a[0] * b[1] - a[1] * b[0]," in text
+    source.write_text(text.replace("a[0] * b[1] - a[1] * b[0],", "5 * (a[0] * b[1] - a[1] * b[0]),"))
+    assert copy.run() == (5.0, 1)
+    assert len(copy.files()) == 1  # what was kept of the old files is gone
+    assert copy.files() != [kept]
+    assert copy.run() == (5.0, 0)
+
+
+def test_several_kernels_are_announced_once(copy):
+    other = "faces.conductances(square, np.array([(0, 1, 2, 3)], np.int32))"
+    assert copy.run(other) == (1.0, 1)
+    assert len(copy.files()) == 2
+
+
+def test_the_folder_that_numba_is_told_is_used(copy):
+    folder = copy.folder / "elsewhere"
+    assert copy.run(NUMBA_CACHE_DIR=str(folder)) == (1.0, 1)
+    assert copy.run(NUMBA_CACHE_DIR=str(folder)) == (1.0, 0)
+    assert all(file.is_relative_to(folder) for file in copy.files())
+
+
+def test_nothing_needs_to_be_writeable(copy):
+    """Neither the package, nor a home, nor a folder for caches: files stand where folders would be made."""
+    nowhere = copy.folder / "file"
+    nowhere.write_text("")
+    (copy.kernels / "__pycache__").write_text("")
+    environment = dict.fromkeys(("HOME", "XDG_CACHE_HOME", "NUMBA_CACHE_DIR"), str(nowhere))
+    assert copy.run(**environment) == (1.0, 1)
+    assert copy.run(**environment) == (1.0, 1)
+    assert copy.files() == []
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="no limit on the size of files")
+def test_a_full_disk_costs_only_time(copy):
+    full = "resource.setrlimit(resource.RLIMIT_FSIZE, (1000, 1000))"
+    assert copy.run(full) == (1.0, 1)
+    assert not [file for file in copy.folder.rglob("*") if file.suffix in (".nbc", ".tmp")]
+    assert copy.run() == (1.0, 1)
+    assert copy.run() == (1.0, 0)
+
+
+@pytest.mark.parametrize(
+    "damage",
+    [
+        lambda data: b"",
+        lambda data: data[:10],
+        lambda data: data[: len(data) // 2],
+        lambda data: data[:-1],
+        lambda data: data[:2000] + bytes([data[2000] ^ 1]) + data[2001:],
+        lambda data: bytes(len(data)),
+    ],
+    ids=["empty", "head", "half", "last", "bit", "zeros"],
+)
+def test_damaged_files_are_as_good_as_missing(copy, damage):
+    assert copy.run() == (1.0, 1)
+    (file,) = copy.files()
+    file.write_bytes(damage(file.read_bytes()))
+    assert copy.run() == (1.0, 1)
+    assert copy.run() == (1.0, 0)
+
+
+def test_many_start_at_once_with_nothing_kept(copy):
+    for process in [copy.start() for _ in range(6)]:
+        assert result_of(process)[0] == 1.0
+    assert copy.run() == (1.0, 0)
+    assert len(copy.files()) == 1
+
+
+FORK = """
+import os, threading, time, numba
+def compile_on():
+    while True:
+        numba.njit(lambda x: x + 1)(1)
+threading.Thread(target=compile_on, daemon=True).start()
+time.sleep(1)
+child = os.fork()
+if child == 0:
+    signal.alarm(60)
+    faces.ring_normals(square, np.array([(0, 1, 2, 3)], np.int32), normal)
+    os._exit(0 if normal[:, 2].sum() == 1 else 1)
+assert os.waitpid(child, 0)[1] == 0
+"""
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="no fork")
+def test_a_fork_while_another_thread_compiles_does_not_hang(copy):
+    assert copy.run(FORK, "sys.stdout.flush(); os._exit(0)")[0] == 1.0
