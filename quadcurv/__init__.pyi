@@ -1,28 +1,50 @@
-from . import curves, schemes, surfaces
-from .boundary import boundary_treatment, one_rings
-from .comparison import compare
-from .curvature import (
-    curvatures,
-    dual_areas,
-    evaluate,
-    gaussian_curvature,
-    laplace_beltrami,
-    mass_matrix,
-    mean_curvature,
-    mean_curvature_normal,
-    principal_curvatures,
-    stiffness_matrix,
-    vertex_normals,
-)
-from .io import as_mesh, attach, read, read_values, to_pymeshlab, to_pyvista, to_trimesh, write
-from .kernels.ranges import set_threads
-from .mesh import QuadGrid, QuadMesh, StaggeredGrid
-from .mesh_quality import quality, summary
-from .refinement import convergence
-from .repair import as_grid, duplicate_points, flip, merge_points, orient, pair_triangles
-from .schemes import SCHEMES, Curvatures, Fit, Laplacian
-from .types import MeshError, MeshWarning, PrecisionWarning
-from .viewing import plot, view
+from . import curves as curves
+from . import schemes as schemes
+from . import surfaces as surfaces
+from .boundary import boundary_treatment as boundary_treatment
+from .boundary import one_rings as one_rings
+from .comparison import compare as compare
+from .curvature import curvatures as curvatures
+from .curvature import dual_areas as dual_areas
+from .curvature import evaluate as evaluate
+from .curvature import gaussian_curvature as gaussian_curvature
+from .curvature import laplace_beltrami as laplace_beltrami
+from .curvature import mass_matrix as mass_matrix
+from .curvature import mean_curvature as mean_curvature
+from .curvature import mean_curvature_normal as mean_curvature_normal
+from .curvature import principal_curvatures as principal_curvatures
+from .curvature import stiffness_matrix as stiffness_matrix
+from .curvature import vertex_normals as vertex_normals
+from .io import as_mesh as as_mesh
+from .io import attach as attach
+from .io import read as read
+from .io import read_values as read_values
+from .io import to_pymeshlab as to_pymeshlab
+from .io import to_pyvista as to_pyvista
+from .io import to_trimesh as to_trimesh
+from .io import write as write
+from .kernels.ranges import set_threads as set_threads
+from .mesh import QuadGrid as QuadGrid
+from .mesh import QuadMesh as QuadMesh
+from .mesh import StaggeredGrid as StaggeredGrid
+from .mesh_quality import quality as quality
+from .mesh_quality import summary as summary
+from .refinement import convergence as convergence
+from .repair import as_grid as as_grid
+from .repair import duplicate_points as duplicate_points
+from .repair import flip as flip
+from .repair import merge_points as merge_points
+from .repair import orient as orient
+from .repair import pair_triangles as pair_triangles
+from .schemes import SCHEMES as SCHEMES
+from .schemes import Curvatures as Curvatures
+from .schemes import Fit as Fit
+from .schemes import Laplacian as Laplacian
+from .types import MeshError as MeshError
+from .types import MeshWarning as MeshWarning
+from .types import PrecisionWarning as PrecisionWarning
+from .viewing import plot as plot
+from .viewing import view as view
 
 __version__: str
 __all__: list[str]

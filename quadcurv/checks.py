@@ -33,12 +33,12 @@ class Finding(NamedTuple):
     """Something in a mesh that was mended, or that has no answer: what, how often, where first (or "")."""
 
     kind: str
-    count: int
+    number: int
     first: str
 
     def __str__(self) -> str:
         text = _FINDINGS[self.kind]
-        return f"{self.count} {text}, first {self.first}" if self.first else text
+        return f"{self.number} {text}, first {self.first}" if self.first else text
 
 
 class Report:
@@ -60,7 +60,7 @@ class Report:
     def __getitem__(self, kind: str) -> int:
         if kind not in _FINDINGS:
             raise KeyError(f"kind: expected one of {', '.join(_FINDINGS)}, got {kind!r}")
-        return sum(f.count for f in self.findings if f.kind == kind)
+        return sum(f.number for f in self.findings if f.kind == kind)
 
     def __bool__(self) -> bool:
         return bool(self.findings)
@@ -201,12 +201,14 @@ def masked_points(points: Any, mask: ArrayLike | None) -> tuple[Floats, Bools | 
 
 def _hidden(points: Any, mask: ArrayLike | None) -> Bools | None:
     """(r, c) what a mask or a masked array hides, None if neither is there or hides anything."""
-    hidden = np.ma.getmaskarray(points).any(axis=-1) if np.ma.is_masked(points) else None
+    hidden: Bools | None = None
+    if np.ma.is_masked(points):
+        hidden = np.asarray(np.ma.getmaskarray(points).any(axis=-1))
     if mask is not None:
         given, shape = np.asarray(mask), np.shape(points)[:-1]
         if given.dtype != bool or given.shape != shape:
             raise MeshError(f"mask: expected booleans of shape {shape}, got {given.dtype} of {given.shape}")
-        hidden = given | hidden if hidden is not None else given.copy()
+        hidden = given.copy() if hidden is None else np.asarray(given | hidden)
     return hidden if hidden is not None and hidden.any() else None
 
 

@@ -135,8 +135,8 @@ def connect(faces: Any, points: Floats) -> Connectivity:
     if n_disagree:
         turn, orientable = _consistent_sides(table)
         if turn.any():
-            where = np.unique(np.flatnonzero(turn) if source is None else source[turn])
-            findings.append(Finding("turned", where.size, f"face {where[0]}"))
+            faces_turned = np.unique(np.flatnonzero(turn) if source is None else source[turn])
+            findings.append(Finding("turned", faces_turned.size, f"face {faces_turned[0]}"))
             table = table.copy()
             quad = table[:, 3] >= 0
             table[turn & quad] = table[turn & quad][:, [0, 3, 2, 1]]
@@ -147,8 +147,8 @@ def connect(faces: Any, points: Floats) -> Connectivity:
     if bad_edge[2]:
         ends = np.unique(edges(table).shared_by_many)
         kind[ends] = topology.NONMANIFOLD
-        where = f"the one from vertex {bad_edge[0]} to {bad_edge[1]}"
-        findings.append(Finding("nonmanifold", int(bad_edge[2]), where))
+        first_edge = f"the one from vertex {bad_edge[0]} to {bad_edge[1]}"
+        findings.append(Finding("nonmanifold", int(bad_edge[2]), first_edge))
     several = np.flatnonzero(kind == topology.SEVERAL_FANS)
     if several.size:
         findings.append(Finding("fans", several.size, f"vertex {several[0]}"))
@@ -169,7 +169,8 @@ def _without_polygons(given: GivenFaces, points: Floats) -> tuple[Ints, Indices 
     large = given.large
     triangles, of = cut(points, large.indptr, large.corners)
     table = np.concatenate((given.table, np.insert(triangles, 3, -1, axis=1).astype(np.int32)))
-    source = np.concatenate((given.source, given.large_source[of]))
+    small = np.arange(len(given.table)) if given.source is None else given.source
+    source = np.concatenate((small, given.large_source[of]))
     face = np.concatenate((np.full(len(given.table), -1), of))
     order = np.argsort(source, kind="stable")
     polygons = Polygons(large.indptr, large.corners, face[order])

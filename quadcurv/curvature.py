@@ -42,7 +42,9 @@ class PrincipalCurvatures(NamedTuple):
     direction2: Floats
 
 
-def curvatures(mesh: Any, scheme: SchemeName | Fit = DEFAULT, boundary: str = "extrapolate") -> Curvatures:
+def curvatures(
+    mesh: Any, scheme: SchemeName | str | Fit = DEFAULT, boundary: str = "extrapolate"
+) -> Curvatures:
     """All that a fit knows at every vertex: H, K, k1, k2, directions, normal, standard errors.
 
     Parameters
@@ -80,7 +82,7 @@ def curvatures(mesh: Any, scheme: SchemeName | Fit = DEFAULT, boundary: str = "e
 
 
 def principal_curvatures(
-    mesh: Any, scheme: SchemeName | Fit = DEFAULT, boundary: str = "extrapolate"
+    mesh: Any, scheme: SchemeName | str | Fit = DEFAULT, boundary: str = "extrapolate"
 ) -> PrincipalCurvatures:
     """Principal curvatures k1 >= k2 and their directions, to be unpacked.
 
@@ -111,7 +113,9 @@ def principal_curvatures(
     return PrincipalCurvatures(found.k1, found.k2, found.direction1, found.direction2)
 
 
-def mean_curvature(mesh: Any, scheme: SchemeName | Scheme = DEFAULT, boundary: str = "extrapolate") -> Floats:
+def mean_curvature(
+    mesh: Any, scheme: SchemeName | str | Scheme = DEFAULT, boundary: str = "extrapolate"
+) -> Floats:
     """Mean curvature H = (k1 + k2) / 2 at every vertex.
 
     Parameters
@@ -164,7 +168,7 @@ def mean_curvature(mesh: Any, scheme: SchemeName | Scheme = DEFAULT, boundary: s
 
 
 def mean_curvature_normal(
-    mesh: Any, scheme: SchemeName | Scheme = DEFAULT, boundary: str = "extrapolate"
+    mesh: Any, scheme: SchemeName | str | Scheme = DEFAULT, boundary: str = "extrapolate"
 ) -> Floats:
     """Mean curvature normal H n, once the mean curvature (half the Laplace-Beltrami of the positions).
 
@@ -202,7 +206,7 @@ def mean_curvature_normal(
 
 
 def gaussian_curvature(
-    mesh: Any, scheme: SchemeName | Fit = DEFAULT, boundary: str = "extrapolate"
+    mesh: Any, scheme: SchemeName | str | Fit = DEFAULT, boundary: str = "extrapolate"
 ) -> Floats:
     """Gaussian curvature K = k1 k2 at every vertex.
 
@@ -272,7 +276,7 @@ def vertex_normals(mesh: Any, boundary: str = "extrapolate") -> Floats:
     return evaluate(mesh, "vertex_normals", boundary=boundary)["vertex_normals"]
 
 
-def dual_areas(mesh: Any, scheme: SchemeName | Scheme = DEFAULT_MATRIX) -> Floats:
+def dual_areas(mesh: Any, scheme: SchemeName | str | Scheme = DEFAULT_MATRIX) -> Floats:
     """Area that a scheme gives to each vertex: the diagonal of its mass matrix.
 
     Parameters
@@ -304,7 +308,7 @@ def dual_areas(mesh: Any, scheme: SchemeName | Scheme = DEFAULT_MATRIX) -> Float
 
 
 def stiffness_matrix(
-    mesh: Any, scheme: SchemeName | Scheme = DEFAULT_MATRIX, out: scipy.sparse.csr_array | None = None
+    mesh: Any, scheme: SchemeName | str | Scheme = DEFAULT_MATRIX, out: scipy.sparse.csr_array | None = None
 ) -> scipy.sparse.csr_array:
     """Stiffness matrix S; the Laplace-Beltrami operator is -M^-1 S, and H n = -M^-1 S x / 2.
 
@@ -342,7 +346,7 @@ def stiffness_matrix(
     return drivers.stiffness(as_mesh(mesh), _as_laplacian(scheme), out)
 
 
-def mass_matrix(mesh: Any, scheme: SchemeName | Scheme = DEFAULT_MATRIX) -> scipy.sparse.dia_array:
+def mass_matrix(mesh: Any, scheme: SchemeName | str | Scheme = DEFAULT_MATRIX) -> scipy.sparse.dia_array:
     """Diagonal mass matrix M of a scheme: its :func:`dual_areas`.
 
     Parameters
@@ -367,11 +371,10 @@ def mass_matrix(mesh: Any, scheme: SchemeName | Scheme = DEFAULT_MATRIX) -> scip
     (386, 386)
     """
     mesh = as_mesh(mesh)
-    areas = dual_areas(mesh, scheme)
-    return scipy.sparse.diags_array(areas[~mesh.mask] if drivers.has_holes(mesh) else areas.ravel())
+    return scipy.sparse.diags_array(mesh.flat(dual_areas(mesh, scheme)))
 
 
-def laplace_beltrami(mesh: Any, f: ArrayLike, scheme: SchemeName | Scheme = DEFAULT_MATRIX) -> Floats:
+def laplace_beltrami(mesh: Any, f: ArrayLike, scheme: SchemeName | str | Scheme = DEFAULT_MATRIX) -> Floats:
     """Laplace-Beltrami operator of functions at the vertices, -M^-1 S f.
 
     Parameters
@@ -415,7 +418,7 @@ def laplace_beltrami(mesh: Any, f: ArrayLike, scheme: SchemeName | Scheme = DEFA
     if drivers.has_holes(mesh):
         if given.shape[:2] != mesh.shape:
             raise ValueError(f"f: shape {given.shape}, expected {mesh.shape} or {(*mesh.shape, 'k')}")
-        return mesh.in_shape(laplace_beltrami(mesh.to_mesh(), given[~mesh.mask], chosen))
+        return mesh.in_shape(laplace_beltrami(mesh.to_mesh(), mesh.flat(given), chosen))
     lead = (len(stencils.points),) if isinstance(mesh, StaggeredGrid) else stencils.shape
     if given.shape[: len(lead)] != lead or given.ndim > len(lead) + 1:
         raise ValueError(f"f: shape {given.shape}, expected {lead} or {(*lead, 'k')}")
@@ -432,7 +435,7 @@ def laplace_beltrami(mesh: Any, f: ArrayLike, scheme: SchemeName | Scheme = DEFA
 def evaluate(
     mesh: Any,
     *wanted: str,
-    scheme: SchemeName | Scheme = "finite_volume",
+    scheme: SchemeName | str | Scheme = "finite_volume",
     boundary: str = "extrapolate",
     out: Mapping[str, Floats] | None = None,
 ) -> dict[str, Floats]:

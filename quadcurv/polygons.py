@@ -79,10 +79,10 @@ def _best(x: Floats) -> Indices:
     for t in range(k - 2):
         # The interval on top of each polygon's stack has at least one corner between its ends.
         depth -= 1
-        i, j = low[rows, depth], high[rows, depth]
-        a = apex[rows, i, j]
-        slots[:, t] = np.stack((i, a, j), axis=1)
-        for begin, end in ((a, j), (i, a)):
+        first, last = low[rows, depth], high[rows, depth]
+        middle = apex[rows, first, last]
+        slots[:, t] = np.stack((first, middle, last), axis=1)
+        for begin, end in ((middle, last), (first, middle)):
             more = end - begin > 1
             low[rows[more], depth[more]], high[rows[more], depth[more]] = begin[more], end[more]
             depth += more

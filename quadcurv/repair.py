@@ -110,7 +110,7 @@ def duplicate_points(mesh: Any, tolerance: float = 0.0) -> NDArray[np.int64]:
     MeshError
         A ValueError: tolerance is negative or not a number.
     """
-    if not tolerance >= 0:
+    if not (isinstance(tolerance, int | float | np.number) and tolerance >= 0):
         raise MeshError(f"tolerance: expected a length >= 0, got {tolerance!r}")
     return first_at_place(face_list(mesh, seams=False).points, tolerance)
 

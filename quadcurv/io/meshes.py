@@ -188,6 +188,8 @@ def read(
     VTK's files, Exodus, glTF and those of meshlane are read in a process of its own, which may take 20 times
     the memory of the file and 200 MB, and 8 seconds of the processor and one more for every 5 MB.
     """
+    if not isinstance(path, str | os.PathLike):
+        raise TypeError(f"path: expected the name of a file, got {type(path).__name__}")
     return _read(path, quads, wrap, True, join)
 
 

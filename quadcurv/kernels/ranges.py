@@ -9,6 +9,7 @@ from collections import deque
 from itertools import pairwise
 
 SERIAL_BELOW = 200_000  # vertices; less work does not pay for waking a thread
+MOST = 1024  # threads
 _pool = None
 _threads = None
 
@@ -43,11 +44,13 @@ def set_threads(number: int | None) -> None:
     Raises
     ------
     ValueError
-        Less than 1.
+        No whole number, less than 1, more than 1024.
     """
     global _threads
-    if number is not None and number < 1:
-        raise ValueError(f"number: expected at least 1 thread, got {number}")
+    if number is not None and (isinstance(number, bool) or not hasattr(number, "__index__")):
+        raise ValueError(f"number: expected a whole number of threads or None, got {number!r}")
+    if number is not None and not 1 <= number <= MOST:
+        raise ValueError(f"number: expected at least 1 thread and at most {MOST}, got {number}")
     _threads = number
 
 

@@ -15,6 +15,7 @@ from quadcurv.types import Bools, Floats, Indices, Ints
 # least are needed, 5, 30 and 100.
 _CONDITION = {2: 20.0, 3: 60.0, 4: 220.0}
 _GROWTH = 3
+_MOST_RINGS = 64
 
 _REFERENCE = "Cazals and Pouget 2005"
 _CANDIDATES = [(d, r) for d in (4, 3, 2) for r in range(2, 9)]
@@ -65,12 +66,12 @@ def jet(degree: int | Literal["auto"] = 4, rings: int | None = None) -> Fit:
         if rings is not None:
             raise ValueError(f'rings: chosen with degree "auto", got {rings!r}')
         return Fit("jet-auto", 4, _REFERENCE, _chosen_curvatures)
-    if degree not in _CONDITION:
+    if not isinstance(degree, int) or degree not in _CONDITION:
         raise ValueError(f'degree: expected "auto" or one of {tuple(_CONDITION)}, got {degree!r}')
     if rings is None:
         rings = 1 if degree == 2 else 2
-    elif rings != int(rings) or rings < 1:
-        raise ValueError(f"rings: expected a whole number, at least 1, got {rings!r}")
+    elif not isinstance(rings, int | np.integer) or not 1 <= rings <= _MOST_RINGS:
+        raise ValueError(f"rings: expected a whole number from 1 to {_MOST_RINGS}, got {rings!r}")
     standard = (degree, rings) in ((2, 1), (3, 2), (4, 2))
     name = "jet" if degree == 4 else f"jet-{degree}"
     return Fit(

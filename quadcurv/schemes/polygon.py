@@ -139,7 +139,7 @@ def alexa_wardetzky(stabilisation: float = 1.0) -> Laplacian:
 
 
 def _checked(stabilisation: float) -> None:
-    if not 0 <= stabilisation < np.inf:
+    if not (isinstance(stabilisation, int | float) and 0 <= stabilisation < np.inf):
         raise ValueError(f"stabilisation: expected a number, not negative, got {stabilisation!r}")
 
 

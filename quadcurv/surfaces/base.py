@@ -196,6 +196,9 @@ class Surface:
         ValueError
             If the layout is unknown, or a surface of several panels is asked for as one grid.
         """
+        cells = tuple(shape) if np.iterable(shape) and not isinstance(shape, str) else (shape,)
+        if len(cells) != 2 or not all(isinstance(n, int | np.integer) and n > 0 for n in cells):
+            raise ValueError(f"shape: expected two positive whole numbers, got {shape}")
         if layout not in ("grid", "staggered", "faces"):
             raise ValueError(f"layout must be 'grid', 'staggered' or 'faces', got {layout!r}")
         if layout == "faces":
