@@ -289,7 +289,7 @@ def convergence(
     >>> import quadcurv as qc
     >>> run = qc.convergence("torus", "liu", [16, 32, 64])
     >>> run.rates("liu", "inf").round(1)
-    array([2., 2.])
+    array([1.9, 2. ])
     """
     surface = surface_of(surface)
     pairs = _pairs(shapes)
