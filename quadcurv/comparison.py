@@ -192,7 +192,7 @@ class Comparison:
         return tables if self.exact is not None else tables + self._pair_tables()
 
     def _main_table(self) -> list[Table]:
-        title = f"Mean curvature H (1/length) and |H - {self.reference}|, over how many vertices"
+        title = f"Mean curvature H (1/length) and |H - {self.reference}| where both are known"
         header = ["scheme", "min H", "max H", "vertices", "mean", "by area", "rms", "max"]
         rows = []
         for name, e in self.norms().items():

@@ -440,3 +440,27 @@ def test_a_reader_that_has_seen_enough(ball):
     ) as child:
         child.stdout.close()
         assert "Traceback" not in child.stderr.read()
+
+
+def test_no_code_of_the_current_folder_is_run(ball, tmp_path):
+    """Files named as libraries lie beside the mesh."""
+    for name in ("pyvista", "matplotlib", "numpy", "trimesh", "vtkmodules", "scipy"):
+        (tmp_path / f"{name}.py").write_text("open('was_run', 'w').close()")
+    program = Path(sys.executable).with_name("quadcurv")
+    done = subprocess.run(
+        [program, "compare", ball, "-s", "liu"], cwd=tmp_path, capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 0, done.stderr
+    assert not (tmp_path / "was_run").exists()
+    assert (tmp_path / "quadcurv-output").is_dir()
+
+
+def test_as_a_module(tmp_path):
+    done = subprocess.run(
+        [sys.executable, "-m", "quadcurv", "--version"],
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    assert done.stdout.strip() == quadcurv.__version__
