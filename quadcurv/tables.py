@@ -15,6 +15,8 @@ from rich.progress import track
 from rich.table import Table
 from rich.text import Text
 
+from quadcurv.io.replacing import replacing
+
 T = TypeVar("T")
 
 WIDTH = 80
@@ -100,6 +102,8 @@ def write_csv(path: str | Path, columns: Mapping[str, ArrayLike]) -> None:
     ------
     ValueError
         Columns of different lengths.
+    OSError
+        It cannot be written; a file that was there is as it was.
     """
     flat: dict[str, list[Any]] = {}
     for name, given in columns.items():
@@ -112,7 +116,7 @@ def write_csv(path: str | Path, columns: Mapping[str, ArrayLike]) -> None:
     sizes = {name: len(values) for name, values in flat.items()}
     if len(set(sizes.values())) > 1:
         raise ValueError(f"columns: expected one length, got {sizes}")
-    with open(path, "w", newline="", encoding="utf-8") as file:
+    with replacing(path) as beside, open(beside, "w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file)
         writer.writerow(flat)
         writer.writerows(zip(*flat.values(), strict=True))

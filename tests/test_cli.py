@@ -176,7 +176,7 @@ def test_view_without_a_display(ball, capsys, monkeypatch):
     [
         (["compare"], "requires an argument"),
         (["compare", "nosuch.obj"], r"nosuch\.obj: No such file or directory"),
-        (["compare", "{folder}"], "Is a directory"),
+        (["compare", "{folder}/folder.obj"], "folder.obj: Is a directory"),
         (["compare", "{ball}", "-s", "mean"], "scheme: expected one of finite_volume, liu, .*, got 'mean'"),
         (["compare", "{ball}", "-s", "liu", "-s", "liu"], "--scheme: expected each once, got liu, liu"),
         (["compare", "{ball}", "--colour"], "Unknown option"),
@@ -193,7 +193,7 @@ def test_view_without_a_display(ball, capsys, monkeypatch):
         ),
         (["view", "torus", "--png", "page.html.jpg"], r"--png: cannot write \.jpg; there are \.png"),
         (["view", "torus", "--merge", "--html", "page.html"], "a surface is sampled; --merge"),
-        (["compare", "{scene}", "--no-join"], "a Scene of 2 geometries, expected one; --join takes them"),
+        (["compare", "{scene}", "--no-join"], "a scene of 2 shapes, which --join joins"),
         (["compare", "{ball}", "--wrap", "rows"], "wrap: only a StructuredGrid has directions to wrap"),
         # What is wrong with an option is said before a file is opened.
         (["compare", "nosuch.obj", "--merge", "-1"], "--merge: expected a length, got -1"),
@@ -225,6 +225,7 @@ def test_refusals_take_one_line(arguments, message, ball, tmp_path, capsys, monk
     (tmp_path / "broken.obj").write_text("v a b c\n")
     (tmp_path / "far.obj").write_text("v 0 0 0\nv 1 0 0\nv 1 1 0\nf 1 2 9\n")
     (tmp_path / "notes.txt").touch()
+    (tmp_path / "folder.obj").mkdir()
     trimesh.Scene([trimesh.creation.box(), trimesh.creation.icosphere()]).export(tmp_path / "scene.glb")
     paths = {
         "scene": tmp_path / "scene.glb",
@@ -296,8 +297,9 @@ def test_scenes_are_joined(tmp_path, capsys):
     scene.add_geometry(box, transform=trimesh.transformations.translation_matrix([9, 0, 0]))
     scene.export(tmp_path / "scene.glb")
     assert run("compare", tmp_path / "scene.glb", "-s", "liu", "--json") == 0
-    out = capsys.readouterr().out
+    out, error = capsys.readouterr()
     assert json.loads(out)["vertices"] == 2 * len(box.vertices) + len(ball.vertices)
+    assert "scene.glb: 3 shapes joined" in error
     assert run("curvature", tmp_path / "scene.glb", "--join", "-o", tmp_path / "out.csv") == 0
     assert max(float(row["x"]) for row in table(tmp_path / "out.csv")) == pytest.approx(9.5)
 

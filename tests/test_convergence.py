@@ -74,6 +74,8 @@ def test_convergence_table_csv_and_dict(tmp_path):
     assert "exact" in text
     assert "2.00" in text
     run.to_csv(tmp_path / "run.csv")
+    with pytest.raises(IsADirectoryError):
+        run.to_csv(tmp_path)
     rows = list(csv.DictReader((tmp_path / "run.csv").read_text().splitlines()))
     assert len(rows) == 2 * 3 * len(NORMS)
     assert float(rows[1]["error"]) == run.errors["finite_volume"]["one"][1]

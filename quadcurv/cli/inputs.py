@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from quadcurv.cli.options import MeshOptions
 from quadcurv.cli.say import say
 from quadcurv.io.base import SAME_PLACE
-from quadcurv.io.meshes import opened
+from quadcurv.io.meshes import PartsError, opened
 from quadcurv.io.seams import closed_grid
 from quadcurv.mesh import QuadGrid, QuadMesh
 from quadcurv.repair import duplicate_points, merge_points, orient
@@ -67,11 +67,12 @@ def load(path: Path, options: MeshOptions) -> Input:
 
 def _read(path: Path, options: MeshOptions) -> Any:
     try:
-        return opened(path, wrap=options.wraps, seams=False, join=options.join)
-    except MeshError as error:
-        raise MeshError(
-            str(error).replace("join=True takes them as one", "--join takes them as one")
-        ) from None
+        return opened(path, wrap=options.wraps, seams=False)
+    except PartsError as error:
+        if not options.join:
+            raise MeshError(f"{path}: a scene of {error.count} shapes, which --join joins") from None
+        say(f"{path}: {error.count} shapes joined")
+        return opened(path, wrap=options.wraps, seams=False, join=True)
 
 
 def _closed(mesh: Any, options: MeshOptions) -> tuple[Any, Indices | None]:

@@ -20,6 +20,14 @@ from quadcurv.types import MeshError
 Wrap = Sequence[bool]
 
 
+class PartsError(MeshError):
+    """A file holds several parts; `count` says how many."""
+
+    def __init__(self, message: str, count: int) -> None:
+        super().__init__(message)
+        self.count = count
+
+
 def as_mesh(mesh: Any, quads: ArrayLike | None = None, wrap: Wrap | None = None) -> Mesh:
     """Make a mesh of anything that holds one.
 
@@ -196,6 +204,8 @@ def read(
 def _read(path: Any, quads: Any, wrap: Any, seams: bool, join: bool = False) -> QuadMesh | QuadGrid:
     try:
         return _made(_content(path, join), quads, wrap, seams)
+    except PartsError as error:
+        raise PartsError(f"{os.fspath(path)}: {error}", error.count) from None
     except MeshError as error:
         raise MeshError(f"{os.fspath(path)}: {error}") from error.__cause__
 
@@ -238,7 +248,7 @@ def _content(path: str | os.PathLike[str], join: bool = False) -> Content:
         return parts
     if not (len(parts) == 1 or (parts and join)):
         hint = "; join=True takes them as one" if parts else ""
-        raise MeshError(f"mesh: a Scene of {len(parts)} geometries, expected one{hint}")
+        raise PartsError(f"mesh: a Scene of {len(parts)} geometries, expected one{hint}", len(parts))
     return joined(parts)
 
 

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike, DTypeLike, NDArray
 
 from quadcurv.comparison import Comparison
+from quadcurv.io.replacing import replacing
 from quadcurv.types import Floats
 from quadcurv.viewing.fields import FIELDS, OF_MESH, Fields
 from quadcurv.viewing.geometry import OVERLAYS, viewpoint
@@ -44,8 +45,9 @@ class Page:
         return f"Page({len(self.text) / 1e6:.1f} MB)"
 
     def save(self, path: str | Path) -> None:
-        """Write the page to a file."""
-        Path(path).write_text(self.text, encoding="utf-8")
+        """Write the page to a file; one that was there stays as it was if that fails."""
+        with replacing(path) as beside:
+            beside.write_text(self.text, encoding="utf-8")
 
     def _repr_html_(self) -> str:
         """How a notebook shows it: in a frame of its own."""

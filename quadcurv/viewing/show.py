@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from quadcurv.comparison import Comparison, compare
+from quadcurv.io.replacing import replacing
 from quadcurv.viewing.opengl import NoOpenGLError, opengl_problem, window_problem
 from quadcurv.viewing.page import Page, make_page
 from quadcurv.viewing.style import Style
@@ -131,7 +132,8 @@ def save_maps(what: Any, path: str | Path, field: str = "error", style: Style | 
 
         with pv.vtk_verbosity("off"):  # it would warn of every way to draw that it tries in vain
             plotter = maps(what, field, style)
-            plotter.screenshot(path)
+            with replacing(path) as beside:
+                plotter.screenshot(beside)
             plotter.close()
     else:
         raise ValueError(f"path: expected a name ending in .png or .html, got {path.name}")
