@@ -336,6 +336,11 @@ def root(x):
     return Real(_called("llvm.sqrt.f64", _DOUBLE, [x.value])) if isinstance(x, Real) else np.sqrt(x)
 
 
+def real(x):
+    """A whole number as a float."""
+    return Real(_drafts[-1].builder.sitofp(x.value, _DOUBLE)) if isinstance(x, Whole) else float(x)
+
+
 def less_half(bits, x):
     """The number whose bits are these less half of those of x."""
     if not isinstance(x, Real):

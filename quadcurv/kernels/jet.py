@@ -8,15 +8,21 @@ are those of the moments sum x^a y^b, 45 numbers for degree 4. Their terms are e
 first, so that what the curvature needs (c10, c01, c20, c11, c02) comes last: the last block of the
 Cholesky factor gives it, and its covariance, without the others.
 
-LANES fits go through every step together, the innermost loops running over them.
+LANES fits go through every step together, the innermost loops running over them: what there is of every fit
+lies in rows of LANES numbers.
 """
 
 from functools import partial
+from math import inf, nan
 
 import numpy as np
-from numba import njit
+
+from quadcurv.kernels.compiled import flat, helper, kernel
+from quadcurv.kernels.formulas import formula, real, root, span, where
+from quadcurv.kernels.vector import cross, less, triple
 
 LANES = 48
+BLOCKS = 8  # of LANES fits, whose neighbourhoods are gathered at once
 # Below this part of a term's square nothing is left but rounding.
 PIVOT = 1e-9
 # Steepest that a neighbourhood of more than one ring may be. A polynomial follows no steeper one (a sphere is
@@ -30,27 +36,380 @@ SIGMA, ERROR, CONDITION, COLUMNS = 13, 14, 18, 19  # ERROR: four of them
 TURNED = np.array([0, 1, 3, 2, 7, 8, 9, 4, 5, 6, 10, 11, 12, 13, 14, 15, 17, 16, 18])
 SIGNS = np.array([-1.0, 1, -1, -1, 1, 1, 1, 1, 1, 1, -1, -1, -1, 1, 1, 1, 1, 1, 1])
 
-# Nothing but fused multiply-adds is left to the compiler: NaN stays NaN. An unsigned index saves it the look
-# whether to count from the end.
-compiled = partial(njit, cache=True, nogil=True, error_model="numpy", fastmath={"contract"})
+# Nothing but fused multiply-adds is left to the compiler: NaN stays NaN.
+step = partial(formula, contract=True)
+
+# Rows of `lane`: the axes of the frame; sums of x^2, x y, y^2, z^2 and of weights; the affine map
+# x = xx x', y = yx x' + yy y'; what of a term's square the terms before it left, at least; an inverse.
+AXES, SXX, SXY, SYY, SZZ, SW = (k * LANES for k in (0, 9, 10, 11, 12, 13))
+XX, YX, YY, LEAST, INVERSE = (k * LANES for k in (14, 15, 16, 17, 18))
 
 
-@compiled()
 def terms_of(degree):
-    """Exponents (T, 2) of the terms in the order of their elimination: x, y, x^2, x y, y^2 last."""
-    terms = np.empty(((degree + 1) * (degree + 2) // 2, 2), np.int64)
-    t = 0
-    for d in range(degree, 2, -1):
-        for b in range(d + 1):
-            terms[t, 0], terms[t, 1] = d - b, b
-            t += 1
-    for a, b in ((0, 0), (1, 0), (0, 1), (2, 0), (1, 1), (0, 2)):
-        terms[t, 0], terms[t, 1] = a, b
-        t += 1
-    return terms
+    """Exponents of the terms in the order of their elimination: x, y, x^2, x y, y^2 last."""
+    higher = [(d - b, b) for d in range(degree, 2, -1) for b in range(d + 1)]
+    return [*higher, (0, 0), (1, 0), (0, 1), (2, 0), (1, 1), (0, 2)]
 
 
-@compiled()
+def workspace(degree):
+    """Scratch of `fit`, and which of its rows make which.
+
+    Returns
+    -------
+    lane, px, py, mu, nu, A
+        Rows: see above; powers of x and y; moments and those with z; the Cholesky factor, with the
+        right-hand side as its last row.
+    products, entries
+        Rows (mu, px, py) of moments, those with z last; rows (A, mu) of the normal equations, the right-hand
+        side last, (A, nu).
+    """
+    terms, top, T = terms_of(degree), 2 * degree, (degree + 1) * (degree + 2) // 2
+    moments = [(a, b) for b in range(top + 1) for a in range(top + 1 - b)]
+    with_z = [(a, b) for b in range(degree + 1) for a in range(degree + 1 - b)]
+    products = [(k, a, b) for table in (moments, with_z) for k, (a, b) in enumerate(table)]
+    entries = [
+        (i * T + j, moments.index((terms[i][0] + terms[j][0], terms[i][1] + terms[j][1])))
+        for i in range(T)
+        for j in range(i + 1)
+    ]
+    entries += [(T * T + i, with_z.index(term)) for i, term in enumerate(terms)]
+    rows = (19, top + 1, top + 1, len(moments), len(with_z), (T + 1) * T)
+    scratch = (np.zeros(count * LANES) for count in rows)
+    return *scratch, flat(products, np.int32), flat(entries, np.int32)
+
+
+def is_turned(a, n):
+    """Whether a normal, of any length, is further than SLOPE from another one, n; not if it is NaN."""
+    up, size = a[0] * n[0] + a[1] * n[1] + a[2] * n[2], n[0] * n[0] + n[1] * n[1] + n[2] * n[2]
+    share = (1.0 + SLOPE * SLOPE) * up / size * where(up < 0, -up, up)
+    return share < a[0] * a[0] + a[1] * a[1] + a[2] * a[2]
+
+
+@step()
+def turned(normals, v, c):
+    """`is_turned` of vertices."""
+    return is_turned(triple(normals, 3 * v, 1), triple(normals, 3 * c, 1))
+
+
+@step()
+def add_point(points, v, c, P, m, lane):
+    """Put a point less a centre, or nothing where it is NaN, into row m of a neighbourhood."""
+    x, y, z = less(triple(points, 3 * v, 1), triple(points, 3 * c, 1))
+    known = x == x
+    for k, value in enumerate((x, y, z, 1.0)):
+        P[(4 * m + k) * LANES + lane] = where(known, value, 0.0)
+
+
+@step()
+def no_point(P, m, lane):
+    """Put nothing into row m of a neighbourhood."""
+    for k in range(4):
+        P[(4 * m + k) * LANES + lane] = 0.0
+
+
+def column(P, m, lane):
+    """Row m of a neighbourhood."""
+    return triple(P, 4 * m * LANES + lane, LANES)
+
+
+@step()
+def window_normal(P, middle, width, axes, block, lane):
+    """The normal across the ring of edge neighbours; missing ones are at the centre."""
+    a = less(column(P, middle + width, lane), column(P, middle - width, lane))
+    b = less(column(P, middle + 1, lane), column(P, middle - 1, lane))
+    for k, x in enumerate(cross(a, b)):
+        axes[(3 * block + k) * LANES + lane] = x
+
+
+@step()
+def vertex_normal(normals, c, axes, block, lane):
+    """The normal as given."""
+    for k, x in enumerate(triple(normals, 3 * c, 1)):
+        axes[(3 * block + k) * LANES + lane] = x
+
+
+@step()
+def frames(normals, block, lane):
+    """Unit normals and, after Duff et al. 2017, bases of their planes without a branch."""
+    for k in span(0, LANES):
+        nx, ny, nz = triple(normals, 3 * block * LANES + k, LANES)
+        length = root(nx * nx + ny * ny + nz * nz)
+        nx, ny, nz = nx / length, ny / length, nz / length
+        sign = where(nz >= 0, 1.0, -1.0)
+        a = -1.0 / (sign + nz)
+        b = nx * ny * a
+        axes = 1.0 + sign * nx * nx * a, sign * b, -sign * nx, b, sign + ny * ny * a, -ny, nx, ny, nz
+        for row, x in enumerate(axes):
+            lane[AXES + row * LANES + k] = x
+        for row in (SXX, SXY, SYY, SZZ, SW):
+            lane[row + k] = 0.0
+
+
+@step()
+def into_frames(P, m, lane):
+    """Turn row m of neighbourhoods into their frames; sum its moments."""
+    for k in span(0, LANES):
+        i = 4 * m * LANES + k
+        dx, dy, dz = triple(P, i, LANES)
+        x, y, z = (
+            lane[AXES + r * LANES + k] * dx
+            + lane[AXES + (r + 1) * LANES + k] * dy
+            + lane[AXES + (r + 2) * LANES + k] * dz
+            for r in (0, 3, 6)
+        )
+        P[i], P[i + LANES], P[i + 2 * LANES] = x, y, z
+        for row, value in ((SXX, x * x), (SXY, x * y), (SYY, y * y), (SZZ, z * z)):
+            lane[row + k] += value
+        lane[SW + k] += P[i + 3 * LANES]
+
+
+@step()
+def affine_maps(lane):
+    """Maps that make second moments unit ones."""
+    for k in span(0, LANES):
+        weight = lane[SW + k]
+        xx = root(lane[SXX + k] / weight)
+        yx = lane[SXY + k] / (weight * xx)
+        square = lane[SYY + k] / weight - yx * yx
+        lane[XX + k], lane[YX + k], lane[YY + k] = xx, yx, root(where(square < 0, 0.0, square))
+        lane[LEAST + k] = 1.0
+
+
+@step()
+def first_powers(P, m, lane, px, py):
+    """Powers 0 and 1 of x, the same of y times the weight."""
+    for k in span(0, LANES):
+        i = 4 * m * LANES + k
+        weight, x = P[i + 3 * LANES], P[i] / lane[XX + k]
+        px[k], px[LANES + k] = 1.0, x
+        py[k], py[LANES + k] = weight, (P[i + LANES] - lane[YX + k] * x) / lane[YY + k]
+
+
+@step()
+def next_powers(px, py, a):
+    """Power a of x and y."""
+    for k in span(0, LANES):
+        i = a * LANES + k
+        px[i] = px[i - LANES] * px[LANES + k]
+        py[i] = py[i - LANES] * py[LANES + k]
+
+
+@step()
+def add_moment(sums, px, py, products, t):
+    """Add one product."""
+    i, a, b = (products[3 * t + k] * LANES for k in range(3))
+    for k in span(0, LANES):
+        sums[i + k] += px[a + k] * py[b + k]
+
+
+@step()
+def clear(rows, count):
+    """Make rows zero."""
+    for k in span(0, count * LANES):
+        rows[k] = 0.0
+
+
+@step()
+def powers_with_z(P, m, py, b):
+    """Multiply a power of y by z."""
+    for k in span(0, LANES):
+        py[b * LANES + k] *= P[(4 * m + 2) * LANES + k]
+
+
+@step()
+def put_entry(A, mu, nu, without_z, entries, t):
+    """One of the normal equations' entries."""
+    moments = where(without_z, mu, nu)
+    i, j = entries[2 * t] * LANES, entries[2 * t + 1] * LANES
+    for k in span(0, LANES):
+        A[i + k] = moments[j + k]
+
+
+@step()
+def pivot(A, lane, mu, diagonal, moment):
+    """How much of a term's square is left, of 1; the inverse of its root."""
+    for k in span(0, LANES):
+        left = A[diagonal * LANES + k]
+        share, least = left / mu[moment * LANES + k], lane[LEAST + k]
+        lane[LEAST + k] = where(share < least, share, least)
+        lane[INVERSE + k] = 1.0 / root(left)
+
+
+@step()
+def scale_entry(A, lane, i):
+    """An entry of the factor."""
+    for k in span(0, LANES):
+        A[i * LANES + k] *= lane[INVERSE + k]
+
+
+@step()
+def eliminate(A, ij, ik, jk):
+    """Take from an entry what the term that is eliminated explains of it."""
+    for k in span(0, LANES):
+        A[ij * LANES + k] -= A[ik * LANES + k] * A[jk * LANES + k]
+
+
+@step()
+def explain(A, lane, i):
+    """Take from the squares of z what the term that is eliminated explains of them."""
+    for k in span(0, LANES):
+        x = A[i * LANES + k]
+        lane[SZZ + k] -= x * x
+
+
+@step()
+def is_determined(lane, k):
+    """Whether a neighbourhood determines the polynomial."""
+    return lane[LEAST + k] > PIVOT
+
+
+@step()
+def unknown(out, at, condition):
+    """Results where nothing is known."""
+    for k in range(COLUMNS):
+        out[at * COLUMNS + k] = condition if k == CONDITION else nan
+
+
+@step()
+def result(A, lane, T, k, out, at):
+    """All results of the k-th fit."""
+    # The last rows and columns of the Cholesky factor, (6, 5), the right-hand side last.
+    B = {(i, j): A[((T - 5 + i) * T + T - 5 + j) * LANES + k] for i in range(6) for j in range(5) if j <= i}
+    frame = [lane[AXES + row * LANES + k] for row in range(9)]
+    weight = lane[SW + k]
+    freedom, square = weight - real(T), lane[SZZ + k]
+    sigma = where(freedom > 0, root(where(square < 0, 0.0, square) / freedom), nan)
+    values, errors = curvatures(B, lane[XX + k], lane[YX + k], lane[YY + k], frame)
+    errors = [error * sigma for error in errors]
+    for column, x in enumerate((*values, sigma, *errors, sensitivity(B) * root(weight))):
+        out[at * COLUMNS + column] = x
+
+
+def sensitivity(B):
+    """How errors in z pass on to the second-order terms: the root of the sum of their variances."""
+    b00, b11, b22 = 1 / B[2, 2], 1 / B[3, 3], 1 / B[4, 4]
+    b10 = -B[3, 2] * b00 * b11
+    b21 = -B[4, 3] * b11 * b22
+    b20 = -(B[4, 2] * b00 + B[4, 3] * b10) * b22
+    return root(b00 * b00 + b10 * b10 + b20 * b20 + b11 * b11 + b21 * b21 + b22 * b22)
+
+
+def curvatures(B, xx, yx, yy, frame):
+    """The first 13 columns of a result, and the standard errors of four of them for sigma = 1."""
+    c02 = B[5, 4] / B[4, 4]
+    c11 = (B[5, 3] - B[4, 3] * c02) / B[3, 3]
+    c20 = (B[5, 2] - B[3, 2] * c11 - B[4, 2] * c02) / B[2, 2]
+    c01 = (B[5, 1] - B[2, 1] * c20 - B[3, 1] * c11 - B[4, 1] * c02) / B[1, 1]
+    c10 = (B[5, 0] - B[1, 0] * c01 - B[2, 0] * c20 - B[3, 0] * c11 - B[4, 0] * c02) / B[0, 0]
+
+    # d/dx = al d/dx' + be d/dy', d/dy = ga d/dy'.
+    al, be, ga = 1 / xx, -yx / (xx * yy), 1 / yy
+    p, q = al * c10 + be * c01, ga * c01
+    zxx = 2 * (al * al * c20 + al * be * c11 + be * be * c02)
+    zxy = ga * (al * c11 + 2 * be * c02)
+    zyy = 2 * ga * ga * c02
+
+    # Shape operator ((a, b), (b, c)) in the basis e1 = (1, 0, p) / e, e2 = (-p q, e^2, q) / (e W).
+    e2 = 1 + p * p
+    e, W = root(e2), root(e2 + q * q)
+    a = -zxx / (e2 * W)
+    b = -(e2 * zxy - p * q * zxx) / (e2 * W * W)
+    c = -(p * p * q * q * zxx - 2 * p * q * e2 * zxy + e2 * e2 * zyy) / (e2 * W * W * W)
+    half, H = (a - c) / 2, (a + c) / 2
+    size = root(half * half + b * b)
+    # Half the angle of (half, b), the larger of cosine and sine first.
+    larger = root((1 + where(half < 0, -half, half) / size) / 2)
+    smaller = b / (2 * size * larger)
+    cos, sin = where(half < 0, smaller, larger), where(half < 0, larger, smaller)
+    cos, sin = where(size == 0, 1.0, cos), where(size == 0, 0.0, sin)
+    first, second, normal = [], [], []
+    for t1, t2, n in zip(frame[:3], frame[3:6], frame[6:], strict=True):
+        f1 = (t1 + p * n) / e
+        f2 = (-p * q * t1 + e2 * t2 + q * n) / (e * W)
+        first.append(cos * f1 + sin * f2)
+        second.append(cos * f2 - sin * f1)
+        normal.append((n - p * t1 - q * t2) / W)
+
+    # Standard errors to first order; those of the slopes are of a higher one.
+    errors = []
+    for da, db, dc in (
+        (0.5, 0.0, 0.5),
+        (c, -2 * b, a),
+        (cos * cos, 2 * cos * sin, sin * sin),
+        (sin * sin, -2 * cos * sin, cos * cos),
+    ):
+        dxx = -da / (e2 * W) + db * p * q / (e2 * W * W) - dc * p * p * q * q / (e2 * W * W * W)
+        dxy = -db / (W * W) + dc * 2 * p * q / (W * W * W)
+        dyy = -dc * e2 / (W * W * W)
+        d20 = 2 * al * al * dxx
+        d11 = 2 * al * be * dxx + ga * al * dxy
+        d02 = 2 * be * be * dxx + 2 * ga * be * dxy + 2 * ga * ga * dyy
+        u = d20 / B[2, 2]
+        v = (d11 - B[3, 2] * u) / B[3, 3]
+        w = (d02 - B[4, 2] * u - B[4, 3] * v) / B[4, 4]
+        errors.append(root(u * u + v * v + w * w))
+    return (H, a * c - b * b, H + size, H - size, *first, *second, *normal), errors
+
+
+@kernel
+def _fit(P, counts, normals, degree, out, size, lane, px, py, mu, nu, A, products, entries):
+    T = (degree + 1) * (degree + 2) // 2
+    moments, normal, room = (degree + 1) * (2 * degree + 1), T * (T + 1) // 2, P.size // (4 * LANES * BLOCKS)
+    for block in range(counts.size):
+        first, last = block * room, block * room + counts[block]
+        frames(normals, block, lane)
+        for m in range(first, last):
+            into_frames(P, m, lane)
+        affine_maps(lane)
+        clear(mu, moments)
+        clear(nu, T)
+        for m in range(first, last):
+            first_powers(P, m, lane, px, py)
+            for a in range(2, 2 * degree + 1):
+                next_powers(px, py, a)
+            for t in range(moments):
+                add_moment(mu, px, py, products, t)
+            for b in range(degree + 1):
+                powers_with_z(P, m, py, b)
+            for t in range(moments, moments + T):
+                add_moment(nu, px, py, products, t)
+        for t in range(normal + T):
+            put_entry(A, mu, nu, t < normal, entries, t)
+        diagonal = 0
+        for k in range(T):
+            pivot(A, lane, mu, k * T + k, entries[2 * diagonal + 1])
+            diagonal += k + 2
+            for i in range(k, T + 1):
+                scale_entry(A, lane, i * T + k)
+            for i in range(k + 1, T + 1):
+                for j in range(k + 1, min(i, T - 1) + 1):
+                    eliminate(A, i * T + j, i * T + k, j * T + k)
+            explain(A, lane, T * T + k)
+        for k in range(min(LANES, size - block * LANES)):
+            if is_determined(lane, k):
+                result(A, lane, T, k, out, block * LANES + k)
+            else:
+                unknown(out, block * LANES + k, inf)
+
+
+@kernel
+def _windows(points, normals, columns, vertices, rings, P, counts, axes, steep):
+    width, total = 2 * rings + 1, vertices.size // 2
+    for k in range(counts.size * LANES):
+        block, lane, at = k // LANES, k % LANES, min(k, total - 1)
+        first, middle = block * width * width, block * width * width + (width * width - 1) // 2
+        c = vertices[2 * at] * columns + vertices[2 * at + 1]
+        counts[block] = width * width
+        found = False
+        for m in range(width * width):
+            v = c + (m // width - rings) * columns + m % width - rings
+            add_point(points, v, c, P, first + m, lane)
+            if rings > 1:
+                found |= turned(normals, v, c)
+        steep[k] = found
+        window_normal(P, middle, width, axes, block, lane)
+
+
 def grid_fits(points, normals, vertices, degree, rings, out):
     """Fit a grid's vertices over windows of 2 rings + 1 points in both directions.
 
@@ -68,51 +427,70 @@ def grid_fits(points, normals, vertices, degree, rings, out):
         Filled. With several rings all is NaN, the CONDITION too, where the neighbourhood is too steep; with
         any, all but the CONDITION, infinite then, where it does not determine the polynomial.
     """
-    width = 2 * rings + 1
-    P = np.empty((width * width, 4, LANES))
-    frame = np.empty((9, LANES))
-    work = workspace(degree)
-    terms = terms_of(degree)
-    for start in range(0, len(vertices), LANES):
-        lanes = min(LANES, len(vertices) - start)
-        for lane in range(LANES):
-            i, j = vertices[start + min(lane, lanes - 1)]
-            cx, cy, cz = points[i, j, 0], points[i, j, 1], points[i, j, 2]
-            m = 0
-            for u in range(i - rings, i + rings + 1):
-                for v in range(j - rings, j + rings + 1):
-                    x = points[u, v, 0]
-                    known = x == x
-                    P[m, 0, lane] = x - cx if known else 0.0
-                    P[m, 1, lane] = points[u, v, 1] - cy if known else 0.0
-                    P[m, 2, lane] = points[u, v, 2] - cz if known else 0.0
-                    P[m, 3, lane] = 1.0 if known else 0.0
-                    m += 1
-            # Across the ring of edge neighbours; missing ones are at the centre.
-            n, s = (m - 1) // 2 - width, (m - 1) // 2 + width
-            w, e = (m - 1) // 2 - 1, (m - 1) // 2 + 1
-            ax, ay, az = (
-                P[s, 0, lane] - P[n, 0, lane],
-                P[s, 1, lane] - P[n, 1, lane],
-                P[s, 2, lane] - P[n, 2, lane],
-            )
-            bx, by, bz = (
-                P[e, 0, lane] - P[w, 0, lane],
-                P[e, 1, lane] - P[w, 1, lane],
-                P[e, 2, lane] - P[w, 2, lane],
-            )
-            frame[6, lane], frame[7, lane], frame[8, lane] = (
-                ay * bz - az * by,
-                az * bx - ax * bz,
-                ax * by - ay * bx,
-            )
-        fit(P, width * width, frame, degree, terms, work, out[start : start + lanes])
-        for k in range(start, start + lanes):
-            if rings > 1 and steep_window(normals, vertices[k, 0], vertices[k, 1], rings):
-                out[k] = np.nan
+    work, columns, room = workspace(degree), points.shape[1], (2 * rings + 1) ** 2
+    points, normals = flat(points), flat(normals)
+    P, axes = np.empty(BLOCKS * room * 4 * LANES), np.empty(BLOCKS * 3 * LANES)
+    steep = np.empty(BLOCKS * LANES, bool)
+    for start in range(0, len(vertices), BLOCKS * LANES):
+        some, results = flat(vertices[start : start + BLOCKS * LANES]), out[start : start + BLOCKS * LANES]
+        counts = np.empty(-(-len(results) // LANES), np.int64)
+        _windows(points, normals, columns, some, rings, P, counts, axes, steep)
+        _fit(P, counts, axes, degree, results.reshape(-1), len(results), *work)
+        results[steep[: len(results)]] = np.nan
 
 
-@compiled()
+@helper
+def neighbourhood(faces, indptr, corners, c, rings, stamp, around):
+    """Write c and the vertices of `rings` rings of faces around it to `around`; how many they are."""
+    stamp[c] = c
+    around[0] = c
+    begin, end = 0, 1
+    for _ in range(rings):
+        new = end
+        for q in range(begin, end):
+            v = around[q]
+            for k in range(indptr[v], indptr[v + 1]):
+                f = corners[k] >> 2
+                for s in range(4):
+                    x = faces[4 * f + s]
+                    if x >= 0 and stamp[x] != c:
+                        stamp[x] = c
+                        around[new] = x
+                        new += 1
+        begin, end = end, new
+    return end
+
+
+@kernel
+def _neighbourhoods(
+    points, faces, indptr, corners, normals, sided, vertices, rings, P, counts, axes, stamp, around
+):
+    room = P.size // (4 * LANES * BLOCKS)
+    for k in range(counts.size * LANES):
+        block, lane, first = k // LANES, k % LANES, k // LANES * room
+        c, m, steep = vertices[min(k, vertices.size - 1)], 0, False
+        if k < vertices.size:
+            m = neighbourhood(faces, indptr, corners, c, rings, stamp, around)
+        if m > room:
+            return m
+        if sided and rings > 1:
+            for i in range(1, m):
+                if 3 * around[i] < normals.size:
+                    steep |= turned(normals, around[i], c)
+        m = 0 if steep else m
+        for i in range(m):
+            add_point(points, around[i], c, P, first + i, lane)
+        count = 0 if lane == 0 else counts[block]
+        for i in range(count, m):
+            for other in range(lane):  # whose neighbourhoods end before
+                no_point(P, first + i, other)
+        for i in range(m, count):
+            no_point(P, first + i, lane)
+        counts[block] = max(count, m)
+        vertex_normal(normals, c, axes, block, lane)
+    return room
+
+
 def face_fits(points, faces, indptr, corners, normals, sided, vertices, degree, rings, out):
     """Fit vertices of a face list over all vertices of `rings` rings of faces around them.
 
@@ -131,277 +509,15 @@ def face_fits(points, faces, indptr, corners, normals, sided, vertices, degree, 
     degree, rings, out
         As for grid_fits.
     """
-    P = np.empty((32, 4, LANES))
-    frame = np.empty((9, LANES))
-    work = workspace(degree)
-    terms = terms_of(degree)
-    stamp = np.full(len(points), -1, np.int32)
-    around = np.empty(len(points), np.int32)
-    for start in range(0, len(vertices), LANES):
-        lanes = min(LANES, len(vertices) - start)
-        count = 0
-        for lane in range(LANES):
-            c = vertices[start + min(lane, lanes - 1)]
-            m = 0
-            if lane < lanes:
-                m = neighbourhood(faces, indptr, corners, c, rings, stamp, around)
-                if sided and rings > 1 and steep(normals, around, m):
-                    m = 0
-            if m > len(P):
-                larger = np.empty((2 * m, 4, LANES))
-                larger[:count] = P[:count]
-                P = larger
-            cx, cy, cz = points[c, 0], points[c, 1], points[c, 2]
-            for k in range(m):
-                v = np.uint32(around[k])
-                P[k, 0, lane] = points[v, 0] - cx
-                P[k, 1, lane] = points[v, 1] - cy
-                P[k, 2, lane] = points[v, 2] - cz
-                P[k, 3, lane] = 1.0
-            if m > count:
-                P[count:m, :, :lane] = 0.0
-                count = m
-            P[m:count, :, lane] = 0.0
-            for x in range(3):
-                frame[6 + x, lane] = normals[c, x]
-        fit(P, count, frame, degree, terms, work, out[start : start + lanes])
-
-
-@compiled()
-def neighbourhood(faces, indptr, corners, c, rings, stamp, around):
-    """Write c and the vertices of `rings` rings of faces around it to `around`; how many they are."""
-    stamp[c] = c
-    around[0] = c
-    begin, end = 0, 1
-    for _ in range(rings):
-        new = end
-        for q in range(begin, end):
-            v = np.uint32(around[q])
-            for k in range(indptr[v], indptr[v + 1]):
-                f = np.uint32(corners[np.uint64(k)]) >> np.uint32(2)
-                for s in range(4):
-                    x = faces[f, s]
-                    if x >= 0 and stamp[x] != c:
-                        stamp[x] = c
-                        around[new] = x
-                        new += 1
-        begin, end = end, new
-    return end
-
-
-@compiled()
-def turned(x, y, z, nx, ny, nz):
-    """Whether the first normal, of any length, is further than SLOPE from the second; not if it is NaN."""
-    up, size = x * nx + y * ny + z * nz, nx * nx + ny * ny + nz * nz
-    return (1.0 + SLOPE * SLOPE) * up / size * abs(up) < x * x + y * y + z * z
-
-
-@compiled()
-def steep_window(normals, i, j, rings):
-    """As `steep`, of the window around row i and column j; NaN where there is no vertex."""
-    nx, ny, nz = normals[i, j, 0], normals[i, j, 1], normals[i, j, 2]
-    found = False
-    for u in range(i - rings, i + rings + 1):
-        for v in range(j - rings, j + rings + 1):
-            found |= turned(normals[u, v, 0], normals[u, v, 1], normals[u, v, 2], nx, ny, nz)
-    return found
-
-
-@compiled()
-def steep(normals, around, m):
-    """Whether the normal of any vertex of a neighbourhood turns too far from that of the first."""
-    c = around[0]
-    nx, ny, nz = normals[c, 0], normals[c, 1], normals[c, 2]
-    found = False
-    for k in range(1, m):
-        v = np.uint32(around[k])
-        if v < len(normals):
-            found |= turned(normals[v, 0], normals[v, 1], normals[v, 2], nx, ny, nz)
-    return found
-
-
-@compiled()
-def workspace(degree):
-    """Scratch of `fit`: powers of x and y; moments, those with z; Cholesky factor; lane scratch."""
-    d, T = degree, (degree + 1) * (degree + 2) // 2
-    return (
-        np.empty((2 * d + 1, LANES)),
-        np.empty((2 * d + 1, LANES)),
-        np.empty((2 * d + 1, 2 * d + 1, LANES)),
-        np.empty((d + 1, d + 1, LANES)),
-        np.empty((T + 1, T, LANES)),
-        np.empty((8, LANES)),
-    )
-
-
-@compiled()
-def fit(P, count, frame, degree, terms, work, out):
-    """Fit LANES neighbourhoods P[:count] (x, y, z, weight; changed) with normals frame[6:9]."""
-    px, py, mu, nu, A, scratch = work
-    L = P.shape[2]
-    sxx, sxy, syy, szz, sw = scratch[0], scratch[1], scratch[2], scratch[3], scratch[4]
-    scratch[:] = 0.0
-    for lane in range(L):
-        nx, ny, nz = frame[6, lane], frame[7, lane], frame[8, lane]
-        length = np.sqrt(nx * nx + ny * ny + nz * nz)
-        nx, ny, nz = nx / length, ny / length, nz / length
-        # Duff et al. 2017: a basis of the tangent plane without a branch.
-        sign = 1.0 if nz >= 0 else -1.0
-        a = -1.0 / (sign + nz)
-        b = nx * ny * a
-        frame[0, lane], frame[1, lane], frame[2, lane] = 1.0 + sign * nx * nx * a, sign * b, -sign * nx
-        frame[3, lane], frame[4, lane], frame[5, lane] = b, sign + ny * ny * a, -ny
-        frame[6, lane], frame[7, lane], frame[8, lane] = nx, ny, nz
-    for m in range(count):
-        for lane in range(L):
-            dx, dy, dz, w = P[m, 0, lane], P[m, 1, lane], P[m, 2, lane], P[m, 3, lane]
-            x = frame[0, lane] * dx + frame[1, lane] * dy + frame[2, lane] * dz
-            y = frame[3, lane] * dx + frame[4, lane] * dy + frame[5, lane] * dz
-            z = frame[6, lane] * dx + frame[7, lane] * dy + frame[8, lane] * dz
-            P[m, 0, lane], P[m, 1, lane], P[m, 2, lane] = x, y, z
-            sxx[lane] += x * x
-            sxy[lane] += x * y
-            syy[lane] += y * y
-            szz[lane] += z * z
-            sw[lane] += w
-    # x = xx x', y = yx x' + yy y' with unit second moments of x', y'.
-    xx, yx, yy = scratch[5], scratch[6], scratch[7]
-    for lane in range(L):
-        xx[lane] = np.sqrt(sxx[lane] / sw[lane])
-        yx[lane] = sxy[lane] / (sw[lane] * xx[lane])
-        yy[lane] = np.sqrt(max(syy[lane] / sw[lane] - yx[lane] * yx[lane], 0.0))
-
-    mu[:] = 0.0
-    nu[:] = 0.0
-    top = 2 * degree
-    for m in range(count):
-        x, y, z, w = P[m, 0], P[m, 1], P[m, 2], P[m, 3]
-        for lane in range(L):
-            px[0, lane] = 1.0
-            py[0, lane] = w[lane]
-            px[1, lane] = x[lane] / xx[lane]
-            py[1, lane] = (y[lane] - yx[lane] * px[1, lane]) / yy[lane]
-        for a in range(2, top + 1):
-            for lane in range(L):
-                px[a, lane] = px[a - 1, lane] * px[1, lane]
-                py[a, lane] = py[a - 1, lane] * py[1, lane]
-        for b in range(top + 1):
-            for a in range(top + 1 - b):
-                for lane in range(L):
-                    mu[a, b, lane] += px[a, lane] * py[b, lane]
-        for b in range(degree + 1):
-            for lane in range(L):
-                py[b, lane] *= z[lane]
-            for a in range(degree + 1 - b):
-                for lane in range(L):
-                    nu[a, b, lane] += px[a, lane] * py[b, lane]
-
-    T = len(terms)
-    for i in range(T):
-        for j in range(i + 1):
-            A[i, j] = mu[terms[i, 0] + terms[j, 0], terms[i, 1] + terms[j, 1]]
-        A[T, i] = nu[terms[i, 0], terms[i, 1]]
-    condition, inverse = sxx, sxy
-    condition[:] = 1.0
-    for k in range(T):
-        a, b = 2 * terms[k, 0], 2 * terms[k, 1]
-        for lane in range(L):
-            # What of the term's square the terms before it leave, of 1.
-            condition[lane] = min(condition[lane], A[k, k, lane] / mu[a, b, lane])
-            inverse[lane] = 1.0 / np.sqrt(A[k, k, lane])
-        for i in range(k, T + 1):
-            for lane in range(L):
-                A[i, k, lane] *= inverse[lane]
-        for i in range(k + 1, T + 1):
-            for j in range(k + 1, min(i, T - 1) + 1):
-                for lane in range(L):
-                    A[i, j, lane] -= A[i, k, lane] * A[j, k, lane]
-        for lane in range(L):
-            szz[lane] -= A[T, k, lane] * A[T, k, lane]
-
-    for lane in range(len(out)):
-        if not condition[lane] > PIVOT:
-            out[lane] = np.nan
-            out[lane, CONDITION] = np.inf
-            continue
-        B = A[T - 5 :, T - 5 :, lane]
-        curvatures(B, xx[lane], yx[lane], yy[lane], frame[:, lane], out[lane])
-        freedom = sw[lane] - T
-        out[lane, SIGMA] = np.sqrt(max(szz[lane], 0.0) / freedom) if freedom > 0 else np.nan
-        for k in range(4):
-            out[lane, ERROR + k] *= out[lane, SIGMA]
-        out[lane, CONDITION] = sensitivity(B) * np.sqrt(sw[lane])
-
-
-@compiled()
-def sensitivity(B):
-    """How errors in z pass on to the second-order terms: the root of the sum of their variances."""
-    b00, b11, b22 = 1 / B[2, 2], 1 / B[3, 3], 1 / B[4, 4]
-    b10 = -B[3, 2] * b00 * b11
-    b21 = -B[4, 3] * b11 * b22
-    b20 = -(B[4, 2] * b00 + B[4, 3] * b10) * b22
-    return np.sqrt(b00 * b00 + b10 * b10 + b20 * b20 + b11 * b11 + b21 * b21 + b22 * b22)
-
-
-@compiled()
-def curvatures(B, xx, yx, yy, frame, out):
-    """Curvatures from the last rows and columns of the Cholesky factor, (6, 5), the right-hand side last."""
-    c02 = B[5, 4] / B[4, 4]
-    c11 = (B[5, 3] - B[4, 3] * c02) / B[3, 3]
-    c20 = (B[5, 2] - B[3, 2] * c11 - B[4, 2] * c02) / B[2, 2]
-    c01 = (B[5, 1] - B[2, 1] * c20 - B[3, 1] * c11 - B[4, 1] * c02) / B[1, 1]
-    c10 = (B[5, 0] - B[1, 0] * c01 - B[2, 0] * c20 - B[3, 0] * c11 - B[4, 0] * c02) / B[0, 0]
-
-    # d/dx = al d/dx' + be d/dy', d/dy = ga d/dy'.
-    al, be, ga = 1 / xx, -yx / (xx * yy), 1 / yy
-    p, q = al * c10 + be * c01, ga * c01
-    zxx = 2 * (al * al * c20 + al * be * c11 + be * be * c02)
-    zxy = ga * (al * c11 + 2 * be * c02)
-    zyy = 2 * ga * ga * c02
-
-    # Shape operator ((a, b), (b, c)) in the basis e1 = (1, 0, p) / e, e2 = (-p q, e^2, q) / (e W).
-    e2 = 1 + p * p
-    e, W = np.sqrt(e2), np.sqrt(e2 + q * q)
-    a = -zxx / (e2 * W)
-    b = -(e2 * zxy - p * q * zxx) / (e2 * W * W)
-    c = -(p * p * q * q * zxx - 2 * p * q * e2 * zxy + e2 * e2 * zyy) / (e2 * W * W * W)
-    half, H = (a - c) / 2, (a + c) / 2
-    root = np.sqrt(half * half + b * b)
-    out[0], out[1], out[2], out[3] = H, a * c - b * b, H + root, H - root
-    # Half the angle of (half, b), the larger of cosine and sine first.
-    if root == 0:
-        cos, sin = 1.0, 0.0
-    elif half >= 0:
-        cos = np.sqrt((1 + half / root) / 2)
-        sin = b / (2 * root * cos)
-    else:
-        sin = np.sqrt((1 - half / root) / 2)
-        cos = b / (2 * root * sin)
-    for x in range(3):
-        t1, t2, n = frame[x], frame[3 + x], frame[6 + x]
-        f1 = (t1 + p * n) / e
-        f2 = (-p * q * t1 + e2 * t2 + q * n) / (e * W)
-        out[4 + x] = cos * f1 + sin * f2
-        out[7 + x] = cos * f2 - sin * f1
-        out[10 + x] = (n - p * t1 - q * t2) / W
-
-    # Standard errors for sigma = 1, to first order; those of the slopes are of a higher one.
-    for k in range(4):
-        if k == 0:
-            da, db, dc = 0.5, 0.0, 0.5
-        elif k == 1:
-            da, db, dc = c, -2 * b, a
-        elif k == 2:
-            da, db, dc = cos * cos, 2 * cos * sin, sin * sin
-        else:
-            da, db, dc = sin * sin, -2 * cos * sin, cos * cos
-        dxx = -da / (e2 * W) + db * p * q / (e2 * W * W) - dc * p * p * q * q / (e2 * W * W * W)
-        dxy = -db / (W * W) + dc * 2 * p * q / (W * W * W)
-        dyy = -dc * e2 / (W * W * W)
-        d20 = 2 * al * al * dxx
-        d11 = 2 * al * be * dxx + ga * al * dxy
-        d02 = 2 * be * be * dxx + 2 * ga * be * dxy + 2 * ga * ga * dyy
-        u = d20 / B[2, 2]
-        v = (d11 - B[3, 2] * u) / B[3, 3]
-        w = (d02 - B[4, 2] * u - B[4, 3] * v) / B[4, 4]
-        out[ERROR + k] = np.sqrt(u * u + v * v + w * w)
+    stamp, around = np.full(len(points), -1, np.int32), np.empty(len(points), np.int32)
+    given = [flat(x) for x in (points, faces, indptr, corners, normals)]
+    work, room, axes = workspace(degree), 32, np.empty(BLOCKS * 3 * LANES)
+    P = np.empty(BLOCKS * room * 4 * LANES)
+    for start in range(0, len(vertices), BLOCKS * LANES):
+        some, results = flat(vertices[start : start + BLOCKS * LANES]), out[start : start + BLOCKS * LANES]
+        counts = np.empty(-(-len(results) // LANES), np.int64)
+        while (found := _neighbourhoods(*given, sided, some, rings, P, counts, axes, stamp, around)) > room:
+            stamp.fill(-1)
+            room = 2 * found
+            P = np.empty(BLOCKS * room * 4 * LANES)
+        _fit(P, counts, axes, degree, results.reshape(-1), len(results), *work)
