@@ -279,7 +279,7 @@ def test_rejected_arguments():
     for bad in (np.empty((6, 5)), np.empty((6, 6), np.float32), np.empty((6, 12))[:, ::2]):
         with pytest.raises(ValueError, match=r"out: mean_curvature wants a writeable .* \(6, 6\)"):
             qc.evaluate(grid, out={"mean_curvature": bad})
-    with pytest.raises(ValueError, match="number: expected at least 1 thread, got 0"):
+    with pytest.raises(ValueError, match="number: expected at least 1 thread and at most 1024, got 0"):
         qc.set_threads(0)
     with pytest.raises(ValueError, match=r"scheme: .* is a fit"):
         qc.evaluate(grid, "mean_curvature", scheme="jet")
