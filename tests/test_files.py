@@ -172,11 +172,13 @@ def _nothing():
 
 
 def test_stl_corners_are_merged(tmp_path, mesh):
-    trimesh.Trimesh(POINTS * 1e-9, qc.to_trimesh(mesh).faces, process=False).export(tmp_path / "mesh.stl")
+    triangles = qc.to_trimesh(mesh).faces[[2, 3, 5, 0, 4, 1]]  # in no order that tells of quads
+    trimesh.Trimesh(POINTS * 1e-9, triangles, process=False).export(tmp_path / "mesh.stl")
     read_back = read(tmp_path / "mesh.stl")
     assert read_back.points.shape == POINTS.shape
     assert np.abs(np.sort(read_back.points, axis=0) - np.sort(POINTS, axis=0) * 1e-9).max() < SINGLE * 1e-8
     assert (read_back.faces[:, 3] < 0).sum() == len(read_back.faces) == 6
+    assert read_back.roundoff == SINGLE / 2
 
 
 def test_glb_is_single_precision_and_its_quads_are_found_again(tmp_path, mesh):

@@ -7,8 +7,11 @@ bytes of these arrays one after the other, or ``{"error": ...}`` alone.
 
 from __future__ import annotations
 
+import contextlib
+import io
 import json
 import os
+import re
 import sys
 from typing import Any
 
@@ -49,36 +52,35 @@ def read_vtk(path: str, memory: int, seconds: int) -> Answer:
     }.get(os.path.splitext(path)[1].lower(), vtkIOExodus.vtkExodusIIReader)()
     limit(memory, seconds)
     reader.SetFileName(path)
+    if isinstance(reader, vtkIOExodus.vtkExodusIIReader):
+        reader.SetSqueezePoints(False)  # every block over all points of the file
+        reader.UpdateInformation()
+        reader.SetAllArrayStatus(reader.NODAL, 1)
     reader.Update()
     data = reader.GetOutputDataObject(0)
+    if errors := _errors(said.GetOutput()):
+        return {"error": errors}, {}
+    blocks = [data]
     if isinstance(reader, vtkIOExodus.vtkExodusIIReader):
-        data = data.GetBlock(0)  # of the element blocks; others hold sides and sets of nodes
-        if data.GetNumberOfBlocks() != 1:
-            return {"error": f"{data.GetNumberOfBlocks()} blocks of elements, expected one"}, {}
-        data = data.GetBlock(0)
-    errors = [line for line in said.GetOutput().splitlines() if "error" in line.lower()]
-    if errors:
-        return {"error": said.GetOutput().strip().splitlines()[-1]}, {}
+        elements = data.GetBlock(0)  # others hold sides and sets of nodes
+        blocks = [elements.GetBlock(k) for k in range(elements.GetNumberOfBlocks())]
+        blocks = [block for block in blocks if block is not None]
+        data = blocks[0] if blocks else None
     meta: dict[str, Any] = {"kind": data.GetClassName() if data is not None else "nothing"}
     if not hasattr(data, "GetPoints"):
         return meta, {}
-    arrays: dict[str, Any] = {}
     points = data.GetPoints()
-    arrays["points"] = vtk_to_numpy(points.GetData()) if points is not None else np.empty((0, 3))
+    arrays = {"points": vtk_to_numpy(points.GetData()) if points is not None else np.empty((0, 3))}
     if data.IsA("vtkStructuredGrid"):
         meta["dimensions"] = [0, 0, 0]
         data.GetDimensions(meta["dimensions"])
     elif data.IsA("vtkPolyData"):
         meta["left_out"] = data.GetNumberOfVerts() + data.GetNumberOfLines()
         meta["strips"] = data.GetNumberOfStrips()
-        cells = data.GetPolys()
+        arrays["offsets"] = vtk_to_numpy(data.GetPolys().GetOffsetsArray())
+        arrays["corners"] = vtk_to_numpy(data.GetPolys().GetConnectivityArray())
     else:
-        cells = data.GetCells()
-        types = data.GetCellTypesArray() if data.GetNumberOfCells() else None
-        arrays["types"] = np.empty(0, np.uint8) if types is None else vtk_to_numpy(types)
-    if not data.IsA("vtkStructuredGrid"):
-        arrays["offsets"] = vtk_to_numpy(cells.GetOffsetsArray())
-        arrays["corners"] = vtk_to_numpy(cells.GetConnectivityArray())
+        arrays |= _cells(blocks, vtk_to_numpy)
     booleans = data.GetFieldData().GetAbstractArray("_PYVISTA_BITARRAY_POINT_")
     if booleans is not None:
         meta["booleans"] = [booleans.GetValue(k) for k in range(booleans.GetNumberOfValues())]
@@ -88,6 +90,24 @@ def read_vtk(path: str, memory: int, seconds: int) -> Answer:
         if array is not None and array.GetName():
             arrays[f"value {array.GetName()}"] = vtk_to_numpy(array)
     return meta, arrays
+
+
+def _errors(said: str) -> str:
+    """The first error that VTK tells of, without the places in its code."""
+    told = said.partition("ERROR: ")[2].partition("\n\n")[0]
+    return " ".join(re.sub(r"^In [^\n]*\n[^\n]*?\(0x[0-9a-f]+\): ", "", told).split())[:300]
+
+
+def _cells(blocks: list[Any], vtk_to_numpy: Any) -> dict[str, Any]:
+    """Cells of unstructured grids over the same points."""
+    types, sizes, corners = [np.empty(0, np.uint8)], [np.zeros(1, np.int64)], [np.empty(0, np.int64)]
+    for block in blocks:
+        if block.GetNumberOfCells():
+            types.append(vtk_to_numpy(block.GetCellTypesArray()))
+            sizes.append(np.diff(vtk_to_numpy(block.GetCells().GetOffsetsArray())))
+            corners.append(vtk_to_numpy(block.GetCells().GetConnectivityArray()))
+    offsets = np.cumsum(np.concatenate(sizes))
+    return {"types": np.concatenate(types), "offsets": offsets, "corners": np.concatenate(corners)}
 
 
 def write_vtkhdf(path: str, memory: int, seconds: int) -> Answer:
@@ -103,8 +123,8 @@ def write_vtkhdf(path: str, memory: int, seconds: int) -> Answer:
     writer.SetFileName(os.path.splitext(path)[0] + ".vtkhdf")
     writer.SetInputConnection(reader.GetOutputPort())
     done = writer.Write()
-    if said.GetOutput().strip() or not done:
-        return {"error": (said.GetOutput().strip().splitlines() or ["nothing was written"])[-1]}, {}
+    if not done or _errors(said.GetOutput()):
+        return {"error": _errors(said.GetOutput()) or "nothing was written"}, {}
     return {}, {}
 
 
@@ -136,8 +156,15 @@ def read_meshlane(path: str, memory: int, seconds: int) -> Answer:
         import meshlane
     except ImportError:
         return {"missing": "meshlane"}, {}
+    abaqus = getattr(meshlane.abaqus._abaqus, "abaqus_to_meshio_type", {})
+    for family in ("S", "M3D", "CPS", "CPE", "CAX", "DS", "R3D", "SFM3D"):
+        for nodes, name in ((3, "triangle"), (4, "quad"), (6, "triangle6"), (8, "quad8"), (9, "quad9")):
+            for more in ("", "R", "I", "H", "T"):
+                abaqus.setdefault(f"{family}{nodes}{more}", name)
     limit(memory, seconds)
-    mesh = meshlane.read(path)
+    with contextlib.redirect_stdout(io.StringIO()) as said, contextlib.redirect_stderr(said):
+        mesh = meshlane.read(path)
+    notes = [" ".join(line.split()) for line in said.getvalue().splitlines() if line.strip()]
     arrays: dict[str, Any] = {"points": np.asarray(mesh.points)}
     names = []
     for k, block in enumerate(mesh.cells):
@@ -148,7 +175,7 @@ def read_meshlane(path: str, memory: int, seconds: int) -> Answer:
         arrays[f"{k} corners"] = np.concatenate(cells) if cells else np.empty(0, np.int64)
     for name, values in mesh.point_data.items():
         arrays[f"value {name}"] = np.asarray(values)
-    return {"names": names}, arrays
+    return {"names": names, "notes": notes[:5]}, arrays
 
 
 JOBS = {f.__name__: f for f in (read_vtk, write_vtkhdf, read_trimesh, read_meshlane)}

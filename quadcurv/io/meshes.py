@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import stat
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -12,12 +13,14 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from quadcurv.io.base import FORMATS, Content, checked_values, joined, library, warn
+from quadcurv.io.quads import quads_by_order
 from quadcurv.io.replacing import replacing
 from quadcurv.io.seams import closed_grid, warn_of_seam
 from quadcurv.mesh import Mesh, QuadGrid, QuadMesh, Recovery, StaggeredGrid
 from quadcurv.types import MeshError
 
 Wrap = Sequence[bool]
+TRIANGULATED = (".obj", ".off", ".ply", ".stl")  # formats in which trimesh writes quads as triangles
 
 
 class PartsError(MeshError):
@@ -77,6 +80,8 @@ def as_mesh(mesh: Any, quads: ArrayLike | None = None, wrap: Wrap | None = None)
     - "given": by `quads`;
     - "carrier": the face attribute that :func:`to_trimesh` leaves; it survives shuffling and copies;
     - "ply": the polygons of the PLY file that the Trimesh was loaded from;
+    - "file": the polygons of the OBJ, OFF or PLY file that it was loaded from by ``trimesh.load``, if that
+      is still there and these are its triangles; looked for where the order does not tell all;
     - "block", "interleaved", "diagonal": by the order of the triangles, or by their closing edges;
     - "none": they are triangles. :func:`quadcurv.pair_triangles` pairs them by their shape.
     """
@@ -162,7 +167,8 @@ def read(
         .vts .vtk                  a grid: QuadGrid         as the file has them, up to double
         .e .exo .ex2 (Exodus)      kept                     double
         .msh .inp .med .xdmf       kept                     double; by meshlane, the extra "formats"
-        .stl                       triangles                text double, binary single; corners merged
+        .stl                       triangles, or quads      text double, binary single; corners merged
+                                   as trimesh writes them
         .glb .gltf                 triangles, or quads      single
                                    again as from a Trimesh
         =========================  =======================  ===========================================
@@ -176,7 +182,9 @@ def read(
     QuadMesh or QuadGrid
         Vertices as in the file; none is merged (but for STL, which repeats every corner) and none is
         split where only texture coordinates or normals differ (but for GLB, which stores them so).
-        Of faces with nodes on their sides, as quads of 8 and 9 nodes, the corners are taken.
+        Where a file holds triangles alone, in the two blocks of halves that trimesh writes for quads, these
+        are paired again, and ``recovery`` says "block". Of faces with nodes on their sides, as quads of 8
+        and 9 nodes, the corners are taken.
 
     Raises
     ------
@@ -245,11 +253,20 @@ def _content(path: str | os.PathLike[str], join: bool = False) -> Content:
     path.open("rb").close()
     parts = reader(path)
     if isinstance(parts, Content):
-        return parts
+        return _as_trimesh_wrote(parts) if suffix in TRIANGULATED else parts
     if not (len(parts) == 1 or (parts and join)):
         hint = "; join=True takes them as one" if parts else ""
         raise PartsError(f"mesh: a Scene of {len(parts)} geometries, expected one{hint}", len(parts))
     return joined(parts)
+
+
+def _as_trimesh_wrote(content: Content) -> Content:
+    """Quads of a file of triangles in blocks of first and second halves, as trimesh writes quads."""
+    faces = content.faces
+    if not isinstance(faces, np.ndarray) or (faces[:, 3:] >= 0).any() or (faces[:, :3] < 0).any():
+        return content
+    paired, rule = quads_by_order(faces[:, :3])
+    return replace(content, faces=paired, pairing=(rule, len(faces))) if rule == "block" else content
 
 
 def _known(what: str) -> str:

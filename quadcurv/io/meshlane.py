@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -24,7 +25,8 @@ def read_meshlane(path: Path) -> Content:
         raise MeshError(f'{path.suffix} needs meshlane: pip install "quadcurv[formats]"')
     blocks = [(name, arrays[f"{k} sizes"], arrays[f"{k} corners"]) for k, name in enumerate(answer["names"])]
     values = {name.removeprefix("value "): v for name, v in arrays.items() if name.startswith("value ")}
-    return _content(arrays["points"], blocks, values)
+    content = _content(arrays["points"], blocks, values)
+    return replace(content, notes=(*content.notes, *answer["notes"]))
 
 
 def _content(points: NDArray[Any], blocks: list[Block], values: dict[str, NDArray[Any]]) -> Content:
@@ -72,4 +74,8 @@ def _has_cells(mesh: Any) -> bool:
 
 
 register(Library(("meshio", "meshlane", "vedo"), content, takes=_has_cells))
-register(Format((".msh", ".inp", ".med", ".xdmf"), read_meshlane))
+register(
+    Format(
+        (".msh", ".inp", ".med", ".xdmf", ".xmf", ".avs", ".ugrid", ".mesh", ".bdf", ".nas"), read_meshlane
+    )
+)

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from quadcurv.io import loaded
 from quadcurv.io.base import Content, Library, checked_values, colours, is_a, register
 from quadcurv.io.quads import quads_by_carrier, quads_by_order, split_quads
 from quadcurv.mesh import QuadMesh
@@ -16,13 +18,14 @@ CARRIER = "quadcurv"  # face attribute of a Trimesh that says which quad a trian
 
 
 def content(mesh: Any) -> Content:
-    """Quads by, in this order: our own carrier, the PLY file loaded, the order of the triangles."""
+    """Quads by, in this order: our own carrier, the file that was loaded, the order of the triangles."""
+    if is_a(mesh, "Scene") and (whole := _file_of_scene(mesh)) is not None:
+        return whole
     mesh = sole_geometry(mesh)
     triangles = np.asarray(mesh.faces)
     faces, rule = _recovered(mesh, triangles)
-    values = {
-        name: np.asarray(v) for name, v in mesh.vertex_attributes.items() if len(v) == len(mesh.vertices)
-    }
+    n = len(mesh.vertices)
+    values = {name: np.asarray(v) for name, v in mesh.vertex_attributes.items() if len(v) == n}
     return Content(np.asarray(mesh.vertices), faces, values, (rule, len(triangles)))
 
 
@@ -42,6 +45,20 @@ def sole_geometry(mesh: Any) -> Any:
     return mesh.geometry[name].copy().apply_transform(transform)
 
 
+def _file_of_scene(scene: Any) -> Content | None:
+    """The mesh of a file that trimesh took apart by materials or groups."""
+    meshes = list(scene.geometry.values())
+    files = {loaded.source(mesh) for mesh in meshes if is_a(mesh, "Trimesh")}
+    path = files.pop() if len(files) == 1 else None
+    if len(meshes) < 2 or path is None:
+        return None
+    if not all(np.array_equal(scene.graph[node][0], np.eye(4)) for node in scene.graph.nodes_geometry):
+        return None
+    corners = np.concatenate([np.asarray(mesh.triangles) for mesh in meshes])
+    found = loaded.faces_of_source(path, corners)
+    return None if found is None else replace(found[0], pairing=("file", len(corners)))
+
+
 def _recovered(mesh: Any, triangles: NDArray[np.int64]) -> tuple[Any, str]:
     """Faces of a Trimesh, the quads it was given or loaded with put together again, and by which rule."""
     if triangles.size and triangles.min() < 0:  # left to QuadMesh to name
@@ -51,7 +68,22 @@ def _recovered(mesh: Any, triangles: NDArray[np.int64]) -> tuple[Any, str]:
         return quads_by_carrier(triangles, carrier), "carrier"
     if (polygons := _ply_polygons(mesh)) is not None:
         return polygons, "ply"
-    return quads_by_order(triangles)
+    faces, rule = quads_by_order(triangles)
+    # Where not all is told by the order the file may know, if it is still there and still the same.
+    if rule == "block" and 2 * len(faces) == len(triangles):
+        return faces, rule
+    path = loaded.source(mesh)
+    if path is None or triangles.max(initial=-1) >= len(mesh.vertices):
+        return faces, rule
+    found = loaded.faces_of_source(path, np.asarray(mesh.triangles))
+    if found is None:
+        return faces, rule
+    as_read = loaded.with_corners(found[0], triangles.ravel()[found[1]])
+    if len(as_read) == len(triangles) and rule == "block":  # quads that trimesh wrote as triangles
+        return faces, rule
+    n_quads = np.count_nonzero(faces[:, 3] >= 0)
+    agreed = isinstance(as_read, np.ndarray) and np.count_nonzero(as_read[:, 3] >= 0) == n_quads
+    return as_read, rule if agreed else "file"
 
 
 def _ply_polygons(mesh: Any) -> Any:
