@@ -302,7 +302,7 @@ def dual_areas(mesh: Any, scheme: SchemeName | str | Scheme = DEFAULT_MATRIX) ->
     >>> import numpy as np, quadcurv as qc
     >>> ball = qc.surfaces.cubed_sphere().sample((24, 24), "faces")[0]
     >>> round(float(qc.dual_areas(ball).sum() / np.pi), 2)
-    3.99
+    4.0
     """
     return evaluate(mesh, "dual_areas", scheme=scheme, boundary="nan")["dual_areas"]
 
