@@ -234,43 +234,52 @@ def _pass(points, size, beyond, beside, liu, Hn, H, normal, area, start, stop, p
             for left in range(begin, end, STRETCH):
                 right = min(left + STRETCH, end)
                 g, at, width = left - begin, i * c + left, right - left
-                load_row(planes, fresh + FIRST + g, points, beyond, inside, first + 3 * left, width)
-                if i < start - 1:
-                    continue
-                if left == begin:
-                    first_quad(planes, p, q, work)
-                # As the work on this stretch goes on, the next one arrives; all of it at once would have to
-                # be waited for.
-                for third in range(3):
-                    ask(points, first + 3 * right + STRETCH * third)
+                computed = i >= start - 1  # before, rows are only loaded
+                if computed:
+                    # As the work on this stretch goes on, the next one arrives, a third at a time; all of it
+                    # at once would have to be waited for.
+                    if left == begin:
+                        first_quad(planes, p, q, work)
+                    ask(points, first + 3 * right)
                     if vectors:
-                        ask_to_write(Hn, 3 * (at + width) + STRETCH * third)
+                        ask_to_write(Hn, 3 * (at + width))
+                    if numbers:
+                        ask_to_write(H, at + width)
                     if normals:
-                        ask_to_write(normal, 3 * (at + width) + STRETCH * third)
-                    if third == 0:
-                        if numbers:
-                            ask_to_write(H, at + width)
-                        if not wanted or (liu and not (numbers or normals)):
-                            quad_normals(planes, p, q, work, g)
-                        elif numbers or normals:
-                            quad_and_ring_normals(planes, o, p, q, work, g)
-                        else:
-                            quad_normals_ring_squares(planes, o, p, q, work, g)
-                    elif third == 1:
-                        if areas:
-                            ask_to_write(area, at + width)
-                        if liu:
-                            liu_scales(work, part, g)
-                            if numbers or normals:
-                                ring_scales(work)
-                        else:
-                            finite_volume_scales(work)
-                    elif vectors or not wanted:
-                        row_vectors(planes, p, q, work, part, unwanted, Hn, wanted, g, at, width)
-                        if numbers and wanted:
-                            vector_curvatures(work, scale, Hn, H, at, width)
-                    elif numbers:
-                        row_curvatures(planes, p, q, work, part, scale, H, g, at, width)
+                        ask_to_write(normal, 3 * (at + width))
+                    if areas:
+                        ask_to_write(area, at + width)
+                    if not wanted or (liu and not (numbers or normals)):
+                        quad_normals(planes, p, q, work, g)
+                    elif numbers or normals:
+                        quad_and_ring_normals(planes, o, p, q, work, g)
+                    else:
+                        quad_normals_ring_squares(planes, o, p, q, work, g)
+                    ask(points, first + 3 * right + STRETCH)
+                    if vectors:
+                        ask_to_write(Hn, 3 * (at + width) + STRETCH)
+                    if normals:
+                        ask_to_write(normal, 3 * (at + width) + STRETCH)
+                load_row(planes, fresh + FIRST + g, points, beyond, inside, first + 3 * left, width)
+                if not computed:
+                    continue
+                if liu:
+                    liu_scales(work, part, g)
+                    if numbers or normals:
+                        ring_scales(work)
+                else:
+                    finite_volume_scales(work)
+                ask(points, first + 3 * right + 2 * STRETCH)
+                if vectors:
+                    ask_to_write(Hn, 3 * (at + width) + 2 * STRETCH)
+                if normals:
+                    ask_to_write(normal, 3 * (at + width) + 2 * STRETCH)
+                if vectors or not wanted:
+                    row_vectors(planes, p, q, work, part, unwanted, Hn, wanted, g, at, width)
+                    if numbers and wanted:
+                        vector_curvatures(work, scale, Hn, H, at, width)
+                elif numbers:
+                    row_curvatures(planes, p, q, work, part, scale, H, g, at, width)
                 last_quad(work)
                 if wanted and normals:
                     unit_normals(work, scale, normal, at, width)

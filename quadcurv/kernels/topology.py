@@ -3,7 +3,7 @@
 Faces are an (m, 4) int32 array, a triangle's last entry being -1. Corner 4 f + s is slot s of face f.
 """
 
-from functools import partial
+from functools import partial, reduce
 
 import numpy as np
 
@@ -16,6 +16,16 @@ FAR = 10_000  # vertices between neighbours in memory, on average, that are in n
 AHEAD = 16  # faces or vertices: where what is read next lies far apart, it is asked for that early
 
 
+def smaller(a, b):
+    """The smaller one."""
+    return where(a < b, a, b)
+
+
+def larger(a, b):
+    """The larger one."""
+    return where(a < b, b, a)
+
+
 @formula
 def checked_face(given, f, sides, n, faces):
     """Copy a face; whether an index is outside, whether a vertex is repeated."""
@@ -23,10 +33,8 @@ def checked_face(given, f, sides, n, faces):
     k = where(sides == 4, given[sides * f + sides - 1], -1)
     for s, v in enumerate((h, i, j, k)):
         faces[4 * f + s] = v
-    outside = (k < -1) | (k >= n)
-    for v in (h, i, j):
-        outside = outside | (v < 0) | (v >= n)
-    return outside, (h == i) | (i == j) | (j == h) | (k == h) | (k == i) | (k == j)
+    least, most = reduce(smaller, (h, i, j)), reduce(larger, (h, i, j, k))
+    return (least < 0) | (k < -1) | (most >= n), (h == i) | (i == j) | (j == h) | (k == h) | (k == i) | (k == j)
 
 
 @kernel
