@@ -105,6 +105,8 @@ def _first_and_count(bad: Any) -> tuple[int, int]:
 
 def checked_points(points: ArrayLike, name: str, shape: tuple[Any, ...]) -> Floats:
     """Read-only C-contiguous float64; a number in `shape` is required, a letter is free."""
+    from quadcurv.kernels.extent import largest
+
     try:
         given = np.asarray(points)
     except (ValueError, OverflowError):  # rows of different lengths, integers beyond all floats
@@ -122,8 +124,8 @@ def checked_points(points: ArrayLike, name: str, shape: tuple[Any, ...]) -> Floa
     with np.errstate(over="ignore"):  # of long doubles; they are found below
         array = np.ascontiguousarray(given, dtype=np.float64).view()
     array.flags.writeable = False
-    extremes = _extremes(array)
-    if not np.isfinite(extremes).all():  # both are NaN if any entry is
+    size = largest(array)
+    if not np.isfinite(size):
         first, count = _first_and_count(~np.isfinite(array.reshape(-1, 3)).all(axis=1))
         where = np.unravel_index(first, array.shape[:-1])
         at = first if array.ndim == 2 else tuple(map(int, where))
@@ -131,7 +133,7 @@ def checked_points(points: ArrayLike, name: str, shape: tuple[Any, ...]) -> Floa
     if array.size:
         rows = array.reshape(-1, 3)
         # The square of an area, hence the fourth power of a length, must neither overflow nor vanish.
-        if np.abs(extremes).max() > _LARGEST:
+        if size > _LARGEST:
             first, count = _first_and_count((np.abs(rows) > _LARGEST).any(axis=1))
             raise MeshError(
                 f"{name}: {count} point(s) beyond {_LARGEST:g}, whose areas overflow, first vertex {first}"
@@ -147,24 +149,6 @@ def unit_roundoff(points: ArrayLike) -> float:
     """Relative rounding error of positions as they are given; integers have that of doubles."""
     dtype = getattr(points, "dtype", np.dtype(float))
     return float(np.finfo(dtype if dtype.kind == "f" else float).eps) / 2
-
-
-def _extremes(array: Floats) -> tuple[float, float]:
-    """Least and largest entry, both NaN if any entry is; 0 of an empty array."""
-    from quadcurv.kernels import ranges
-
-    if array.size == 0:
-        return 0.0, 0.0
-    found = []
-
-    def look(start: int, stop: int) -> None:
-        part = array[start:stop]
-        with np.errstate(invalid="ignore"):
-            found.append((part.min(), part.max()))
-
-    ranges.over(look, len(array), array.size // 3)
-    low, high = np.transpose(found)
-    return low.min(), high.max()
 
 
 def masked_points(points: Any, mask: ArrayLike | None) -> tuple[Floats, Bools | None, list[Finding]]:

@@ -17,7 +17,7 @@ from numba import config, njit
 import quadcurv as qc
 from comparisons.performance import interpreted
 from quadcurv import SCHEMES, QuadGrid, QuadMesh, StaggeredGrid
-from quadcurv.kernels import formulas, order, ranges, rows, topology, vector
+from quadcurv.kernels import extent, formulas, order, ranges, rows, topology, vector
 
 NAMES = ("mean_curvature", "mean_curvature_normal", "vertex_normals", "dual_areas")
 DIRECT = ("finite_volume", "liu")
@@ -197,6 +197,30 @@ def test_sizes_far_from_one(scheme, size):
     for mesh in (QuadGrid(size * points), QuadGrid(size * points).to_mesh()):
         scaled = qc.mean_curvature(mesh, scheme).reshape(H.shape)
         np.testing.assert_allclose(scaled * size, H, rtol=0, atol=1e-12 * np.abs(H).max())
+
+
+@pytest.mark.parametrize("threads", [1, 2])
+@pytest.mark.parametrize(
+    ("entries", "expected"),
+    [
+        ([], 0),
+        ([0.0, -0.0], 0),
+        ([1, -3, 2], 3),
+        ([5e-324, 0], 5e-324),
+        ([-1.7e308, 1], 1.7e308),
+        ([1, -np.inf], np.inf),
+        ([np.inf, np.nan, 1], np.nan),
+        ([1, -np.nan], np.nan),
+    ],
+)
+def test_the_largest_magnitude_of_an_array(entries, expected, threads, monkeypatch):
+    monkeypatch.setattr(ranges, "SERIAL_BELOW", 0)
+    qc.set_threads(threads)
+    assert extent.largest(np.array(entries, float)) == pytest.approx(expected, rel=0, abs=0, nan_ok=True)
+    where = np.random.default_rng(0).permutation(1000)[: len(entries)]
+    many = np.zeros(1000)
+    many[where] = entries
+    assert extent.largest(many) == pytest.approx(expected, rel=0, abs=0, nan_ok=True)
 
 
 def test_products_and_sums_are_rounded_once_or_twice():

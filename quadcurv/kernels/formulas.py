@@ -62,7 +62,7 @@ class _Value:
     def __init__(self, value):
         self.value = value
 
-    __hash__ = None
+    __hash__ = None  # type: ignore[assignment]
 
     def __bool__(self):
         raise TypeError("a formula is written down before its values are known: use where, not if")
@@ -149,7 +149,7 @@ class Memory:
         draft, machine = _drafts[-1], _machine(self.dtype)
         value = _kind(self.dtype).of(x)
         if value.type != machine:
-            value = draft.builder.trunc(value, machine)
+            value = (draft.builder.zext if value.type == _BOOL else draft.builder.trunc)(value, machine)
         draft.marked(draft.builder.store(value, self.address(index)), self.owners)
 
 
@@ -290,28 +290,31 @@ def span(start, stop, together=None):
 
 
 class Carried:
-    """A triple or other tuple of numbers that one turn of a `span` leaves for the next."""
+    """A tuple of values that one turn of a `span` leaves for the next."""
 
-    def __init__(self, numbers):
+    def __init__(self, values):
+        self._values = values
         if _drafts:
-            builder = _drafts[-1].builder
-            self._places = [cgutils.alloca_once_value(builder, Real.of(x)) for x in numbers]
-        else:
-            self._numbers = numbers
+            self._kinds = [type(x) if isinstance(x, _Value) else Real for x in values]
+            self._places = [
+                cgutils.alloca_once_value(_drafts[-1].builder, kind.of(x))
+                for kind, x in zip(self._kinds, values, strict=True)
+            ]
 
     def get(self):
-        """The numbers of the turn before, or those that the loop begins with."""
+        """What the turn before left, or the loop begins with."""
         if not _drafts:
-            return self._numbers
-        return tuple(Real(_drafts[-1].builder.load(place)) for place in self._places)
+            return self._values
+        load = _drafts[-1].builder.load
+        return tuple(kind(load(place)) for kind, place in zip(self._kinds, self._places, strict=True))
 
-    def set(self, numbers):
-        """Leave other numbers."""
+    def set(self, values):
+        """Leave other values."""
         if not _drafts:
-            self._numbers = numbers
+            self._values = values
             return
-        for place, x in zip(self._places, numbers, strict=True):
-            _drafts[-1].builder.store(Real.of(x), place)
+        for kind, place, x in zip(self._kinds, self._places, values, strict=True):
+            _drafts[-1].builder.store(kind.of(x), place)
 
 
 def _called(name, returned, arguments):
@@ -339,6 +342,13 @@ def root(x):
 def real(x):
     """A whole number as a float."""
     return Real(_drafts[-1].builder.sitofp(x.value, _DOUBLE)) if isinstance(x, Whole) else float(x)
+
+
+def bits(x):
+    """The bits of a float, as a whole number."""
+    return (
+        Whole(_drafts[-1].builder.bitcast(x.value, _INT)) if isinstance(x, Real) else np.float64(x).view(int)
+    )
 
 
 def less_half(bits, x):

@@ -34,7 +34,9 @@ def checked_face(given, f, sides, n, faces):
     for s, v in enumerate((h, i, j, k)):
         faces[4 * f + s] = v
     least, most = reduce(smaller, (h, i, j)), reduce(larger, (h, i, j, k))
-    return (least < 0) | (k < -1) | (most >= n), (h == i) | (i == j) | (j == h) | (k == h) | (k == i) | (k == j)
+    return (least < 0) | (k < -1) | (most >= n), (h == i) | (i == j) | (j == h) | (k == h) | (k == i) | (
+        k == j
+    )
 
 
 @kernel
