@@ -15,6 +15,7 @@ from quadcurv.io.quads import quads_by_order
 from quadcurv.mesh import QuadMesh
 from quadcurv.types import MeshError, PrecisionWarning
 
+COARSE = 1e-3  # of an edge: rounding by more is said
 KNOWN = "_known"  # ends the name of the values that tell where others are known: glTF has no NaN
 
 
@@ -60,7 +61,11 @@ def write_glb(path: Path, mesh: QuadMesh, values: Values) -> None:
     Where a value is not finite it is stored as 0, and _NAME_known is 0, else 1.
     """
     surface = adapter.from_mesh(mesh)
-    _checked_single("points", mesh.points)
+    rounding = np.abs(_checked_single("points", mesh.points) - mesh.points).max()
+    edge = np.median(np.linalg.norm(mesh.points[mesh.faces[:, 1]] - mesh.points[mesh.faces[:, 0]], axis=1))
+    if rounding > COARSE * edge:
+        text = f"points: single precision, which is what glTF holds, moves them by up to {rounding:.2g}"
+        warn(f"{text}, {rounding / edge:.2g} of an edge" if edge else text, PrecisionWarning)
     coloured, taken = False, set[str]()
     for name, array in values.items():
         known = np.isfinite(array).reshape(len(array), -1).all(axis=1)

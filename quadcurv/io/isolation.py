@@ -35,7 +35,7 @@ def isolated(job: str, path: Path) -> tuple[dict[str, Any], dict[str, NDArray[An
     """
     if not sys.executable or getattr(sys, "frozen", False):
         raise MeshError("it is read by a second Python, and this program has none")
-    size = path.stat().st_size
+    size = _size(path)
     memory, seconds = MEMORY + 20 * size, SECONDS + size // 5_000_000
     run = f"import sys; sys.path += {_search_path()!r}; sys.argv = sys.argv[1:]; "
     run += "import runpy; runpy.run_path(sys.argv[0], run_name='__main__')"
@@ -63,6 +63,17 @@ def isolated(job: str, path: Path) -> tuple[dict[str, Any], dict[str, NDArray[An
     if "error" in answer:
         raise MeshError(answer["error"])
     return answer, arrays
+
+
+def _size(path: Path) -> int:
+    """Bytes of a file, and of those in its folder that it names where its format is made of several."""
+    size = path.stat().st_size
+    if path.suffix.lower() in (".gltf", ".xdmf", ".xmf"):
+        text = path.read_bytes()
+        size += sum(
+            f.stat().st_size for f in path.parent.iterdir() if f.name.encode() in text and f.is_file()
+        )
+    return size
 
 
 def _search_path() -> list[str]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import stat
 from collections.abc import Mapping, Sequence
@@ -189,9 +190,10 @@ def read(
     Raises
     ------
     MeshError
-        A ValueError: the file holds no surface mesh, or not one of these formats, or several parts.
+        A ValueError: the file holds no surface mesh, or not one of these formats, or several parts; or it
+        is no regular file but a pipe or a device.
     OSError
-        It cannot be opened, or is no regular file.
+        It cannot be opened.
 
     Warns
     -----
@@ -245,8 +247,13 @@ def read_values(path: str | os.PathLike[str]) -> dict[str, NDArray[Any]]:
 def _content(path: str | os.PathLike[str], join: bool = False) -> Content:
     path = Path(path)
     suffix = path.suffix.lower()
-    if not stat.S_ISREG(path.stat().st_mode):
-        path.open("rb").close()  # of a folder the system says it best
+    try:
+        mode = path.stat().st_mode
+    except ValueError as error:  # a name that no system has
+        raise MeshError(str(error)) from None
+    if stat.S_ISDIR(mode):
+        raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR), str(path))
+    if not stat.S_ISREG(mode):  # a pipe or a device, which may give bytes without end, or none
         raise MeshError("no regular file")
     if suffix not in FORMATS or (reader := FORMATS[suffix].read) is None:
         raise MeshError(f"cannot read {suffix or 'a file without suffix'}; {_known('read')} can be")

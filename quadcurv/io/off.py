@@ -63,7 +63,7 @@ def _text(text: bytes) -> tuple[Any, Any, Any]:
         row = distinct(np.append(1, row[row > 1]))
     n, m = (_whole(x) for x in number[row[0] : row[0] + 2])
     # The number of edges, which nobody counts, may miss where the line ends before it.
-    begin = row[0] + min(row[1] - row[0], 3)
+    begin = row[0] + (2 if row[1] - row[0] == 2 else 3)
     if len(number) < begin + 3 * n + m:
         raise ValueError(f"{n} points and {m} faces are more than its {len(number)} numbers hold")
     rows = np.append(begin, row[row > begin])

@@ -24,8 +24,10 @@ def read_stl(path: Path) -> Content:
     with path.open("rb") as file:
         head = file.read(84)
     count = int.from_bytes(head[80:], "little") if len(head) == 84 else 0
-    # Binary files may begin with "solid" too; their length tells.
-    if len(head) == 84 and (size == 84 + 50 * count or not head.lstrip().startswith(b"solid")):
+    # Binary files may begin with "solid" too; their length tells, or bytes that no text has.
+    if len(head) == 84 and (
+        size == 84 + 50 * count or b"\0" in head or not head.lstrip().startswith(b"solid")
+    ):
         if size < 84 + 50 * count:
             raise MeshError(f"not an STL file: {size} bytes are too few for {count} triangles")
         soup = np.fromfile(path, _RECORD, count, offset=84)["corners"].reshape(-1, 3)
@@ -64,7 +66,8 @@ def _merged(soup: NDArray[np.floating]) -> Content:
     rim = _on_open_edges(triangles)
     if rim.size and np.isfinite(points).all():
         place = np.arange(len(points))
-        tolerance = SAME_PLACE * float(np.ptp(points.astype(float), axis=0).max())
+        extent, offset = np.ptp(points.astype(float), axis=0).max(), np.abs(points).max()
+        tolerance = float(max(SAME_PLACE * extent, 2 * np.finfo(np.float32).eps * offset))
         place[rim] = rim[first_at_place(points[rim].astype(float), tolerance)]
         kept, corner = np.unique(place, return_inverse=True)
         points, triangles = points[kept], corner[triangles]
