@@ -157,10 +157,10 @@ def frenet_frame(points: ArrayLike, closed: bool = False) -> FrenetFrame:
 def torsion(points: ArrayLike, closed: bool = False) -> Array:
     """Torsion tau at every point of a curve, in 1/length, positive on a right-handed helix.
 
-    The normals n of two neighbours and the tangent t of the edge between them give the torsion of
-    that edge, (dn/ds + kappa t).(t x n) = t.(n_j x n_{j+1}) / s; a point takes the mean of its two
-    edges. s is a third of the three edges around: on even spacing the primal spacing |t_(1)|, by
-    which (2.54) should divide, and on uneven spacing what keeps the scheme consistent.
+    Each edge has dn/ds, the difference of its two points' normals over a step s, and of
+    tau b = dn/ds + kappa t (2.55) the part along its binormal b = t x n; a point takes the mean of its
+    two edges. s is a third of the three edges around. On even spacing that is the primal spacing
+    |t_(1)|, by which (2.54) should divide, and the result is the thesis's own, with a sign.
 
     Parameters
     ----------
@@ -183,14 +183,22 @@ def torsion(points: ArrayLike, closed: bool = False) -> Array:
     -----
     Of second order where the spacing is even or varies smoothly, of first order where it jumps.
     Rounding of the coordinates X adds eps |X| / (kappa h^3).
+
+    256 points of ``helix()`` give an error of 2.4e-5 (tau = 0.4) on even steps and of 7e-5 on steps that
+    vary by up to half. Dividing by the edge alone, as (2.54) does once its slip is mended, gives the same
+    on even steps, less than half the error where steps vary slowly (1.9e-5 against 4.4e-5 on the twisted
+    cubic), and does not converge where they jump: 0.2 off. The triple product t.(n_j x n_{j+1})/s has
+    four times the error on even steps.
     """
     position, eps = _positions("points", points, closed)
     tangent, length, rounding = _edges(position, closed, eps)
     normal = _in_space(_unit(np.diff(tangent, axis=0), rounding))
     before, after = normal[:-1], normal[1:]
-    volume = _dot(_in_space(tangent[1:-1]), np.cross(before, after))
-    volume *= np.copysign(1, _dot(before, after))  # turns back a normal that an inflection reversed
-    tau = 3 * volume / (length[:-2] + length[1:-1] + length[2:])
+    # turns back a normal that an inflection reversed
+    after = np.copysign(1, _dot(before, after))[:, None] * after
+    binormal = np.cross(_in_space(tangent[1:-1]), before + after)
+    binormal = _unit(binormal, np.zeros(len(binormal)))
+    tau = 3 * _dot(after - before, binormal) / (length[:-2] + length[1:-1] + length[2:])
     mean: Array = (tau[:-1] + tau[1:]) / 2
     return mean
 

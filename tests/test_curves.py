@@ -173,9 +173,9 @@ def test_euler_spiral() -> None:
 
 
 CURVED = {
-    "helix": (curves.helix(), 8.2e-6, 2.5e-5),
-    "left-handed helix": (curves.helix(2.0, -1.0), 4.2e-6, 1.3e-5),
-    "twisted cubic": (twisted_cubic(), 5.7e-6, 1.9e-5),
+    "helix": (curves.helix(), 8.2e-6, 6.2e-6),
+    "left-handed helix": (curves.helix(2.0, -1.0), 4.2e-6, 3.1e-6),
+    "twisted cubic": (twisted_cubic(), 5.7e-6, 1.2e-5),
 }
 
 
@@ -189,7 +189,7 @@ def test_space_curves(name) -> None:
         kappa_errors.append(np.abs(curvature(points) - curve.curvature(t))[1:-1].max())
         tau_errors.append(np.abs(torsion(points) - curve.torsion(t))[2:-2].max())
     check(kappa_errors, 2.0, kappa_bound, 0.03)
-    check(tau_errors, 2.0, tau_bound, 0.1)
+    check(tau_errors, 2.0, tau_bound, 0.15)
 
 
 def test_sign_of_torsion() -> None:
@@ -201,17 +201,17 @@ def test_sign_of_torsion() -> None:
 @pytest.mark.parametrize("curve", [arc(), curves.helix(), twisted_cubic()], ids=["arc", "helix", "cubic"])
 def test_open_ends(curve) -> None:
     sizes = [256, 512, 1024]
-    quantities = [(curvature, curve.curvature)]
+    quantities = [(curvature, curve.curvature, 1.2, 1.85)]
     if curve.mapping(np.zeros(1)).shape[1] == 3:
-        quantities.append((torsion, curve.torsion))
-    for found, exact in quantities:
+        quantities.append((torsion, curve.torsion, 1.8, 1.7))
+    for found, exact, factor, rate in quantities:
         end = []
         for n in sizes:
             t = evenly(curve, n)
             error = np.abs(found(curve.mapping(t)) - exact(t))
             end.append(error[[0, 1, -2, -1]].max())
-            assert end[-1] < 1.2 * error[2:-2].max()
-        assert fitted_rate(sizes, end) > 1.85
+            assert end[-1] < factor * error[2:-2].max()
+        assert fitted_rate(sizes, end) > rate
 
 
 def test_smooth_uneven_spacing_keeps_second_order() -> None:
@@ -260,19 +260,39 @@ def test_documented_cost_of_jumping_spacing() -> None:
     assert relative[unevenly] == pytest.approx(2e-2, rel=0.2)
 
 
-def test_torsion_is_the_printed_one_corrected() -> None:
+def printed_torsion(points, step) -> np.ndarray:
+    """(2.54) with a step of its own, (2.55) and (2.56), as the mean of a point's two edges: unsigned."""
+    H = curvature_normal(points)
+    kappa = np.linalg.norm(H, axis=1, keepdims=True)
+    edge = np.diff(points, axis=0)
+    spacing = np.linalg.norm(edge, axis=1, keepdims=True)
+    tau_b = np.diff(H / kappa, axis=0) / step(spacing) + (kappa[1:] + kappa[:-1]) / 2 * edge / spacing
+    tau = np.linalg.norm(tau_b, axis=1)
+    return (tau[1:] + tau[:-1]) / 2
+
+
+def test_torsion_is_the_printed_one_corrected_on_even_spacing() -> None:
     # (2.54) with the primal spacing, (2.55) and (2.56), on the inner edges: unsigned.
-    differences = []
     for n in SIZES:
         points = curves.helix(1.0, -0.5).mapping(evenly(curves.helix(), n))
-        H = curvature_normal(points)
-        kappa = np.linalg.norm(H, axis=1, keepdims=True)
-        edge = np.diff(points, axis=0)
-        spacing = np.linalg.norm(edge, axis=1, keepdims=True)
-        tau_b = np.diff(H / kappa, axis=0) / spacing + (kappa[1:] + kappa[:-1]) / 2 * edge / spacing
-        tau = np.linalg.norm(tau_b, axis=1)
-        differences.append(np.abs((tau[2:-2] + tau[1:-3]) / 2 + torsion(points)[2:-3]).max())
-    check(differences, 2.0, 1e-4, 0.05)
+        printed = printed_torsion(points, lambda spacing: spacing)
+        assert np.abs(printed + torsion(points)[1:-1])[1:-1].max() < 1e-13
+
+
+def test_where_the_printed_torsion_wins_and_where_it_fails() -> None:
+    curve, found = twisted_cubic(), {}
+    for sampling in (evenly, unevenly):
+        t = sampling(curve, 256)
+        points = curve.mapping(t)
+        printed = printed_torsion(points, lambda spacing: spacing) - curve.torsion(t)[1:-1]
+        found[sampling] = [
+            np.abs(e).max() for e in (printed[1:-1], (torsion(points) - curve.torsion(t))[2:-2])
+        ]
+    np.testing.assert_allclose(found[evenly], [1.9e-5, 4.4e-5], rtol=0.05)
+    assert found[unevenly][0] > 0.5
+    assert found[unevenly][1] < 8e-3
+    t = unevenly(curves.helix(), 256)
+    assert np.abs(torsion(curves.helix().mapping(t)) - 0.4)[2:-2].max() < 7e-5
 
 
 # ---------------------------------------------------------------- the frame
