@@ -89,6 +89,7 @@ def convergence_plot(
     slopes: Sequence[float] = (),
     rounding: tuple[ArrayLike, str] | None = None,
     joined: bool = False,
+    styles: Mapping[str, Mapping[str, Any]] | None = None,
 ) -> dict[str, float]:
     """Errors against size on logarithmic axes, with best-fit lines as the thesis draws them.
 
@@ -108,6 +109,9 @@ def convergence_plot(
         What rounding alone is expected to give, shown dotted.
     joined : bool
         Whether a thin line joins the errors.
+    styles : mapping from label to mapping, optional
+        Properties of a label's markers ("color", "marker", "fillstyle" and the like) that are not to
+        follow its place in the series: a scheme keeps its own from figure to figure.
 
     Returns
     -------
@@ -122,21 +126,20 @@ def convergence_plot(
     axes.set_yscale("log")
     axes.minorticks_off()
     rates: dict[str, float] = {}
+    markers = {label: _style(i) | dict((styles or {}).get(label, {})) for i, label in enumerate(errors)}
     for i, (label, e) in enumerate(errors.items()):
-        style: dict[str, Any] = {"color": COLOURS[i % len(COLOURS)], "marker": MARKERS[i % len(MARKERS)]}
-        text = label
+        style, text = markers[label], label
         if fit and label in fit:
             rates[label] = rate = _fitted_line(axes, n, e, fit[label], style["color"])
-            text = f"{label}: rate {rate:.2f}" if np.isfinite(rate) else label
+            text = f"{label}: rate {_signed(rate)}" if np.isfinite(rate) else label
         line = ("-" if i < len(COLOURS) else "--") if joined else "none"
-        if joined:
-            style |= {"linewidth": 1.2, "markersize": 4.5}
-        axes.plot(n, np.where(e == 0, np.nan, e), linestyle=line, label=text, **style)
-    for i, e in enumerate(errors.values()):
+        size = {"linewidth": 1.2, "markersize": 4.5} if joined else {}
+        axes.plot(n, np.where(e == 0, np.nan, e), **{"linestyle": line, "label": text, **size, **style})
+    for label, e in errors.items():
         zero = e == 0
         if zero.any():
-            style = {"color": COLOURS[i % len(COLOURS)], "marker": MARKERS[i % len(MARKERS)]}
-            axes.plot(n[zero], np.full(zero.sum(), floor), linestyle="none", fillstyle="none", **style)
+            style = markers[label] | {"linestyle": "none", "fillstyle": "none"}
+            axes.plot(n[zero], np.full(zero.sum(), floor), **style)
             axes.set_ylim(bottom=floor)
     for k, edge in enumerate(sorted({size for span in (fit or {}).values() for size in span})):
         axes.axvline(
@@ -150,6 +153,15 @@ def convergence_plot(
         axes.plot(n, level, color="0.3", linestyle=":", label=f"rounding, {label}")
     axes.legend()
     return rates
+
+
+def _style(i: int) -> dict[str, Any]:
+    return {"color": COLOURS[i % len(COLOURS)], "marker": MARKERS[i % len(MARKERS)]}
+
+
+def _signed(rate: float) -> str:
+    """A rate with a true minus, and none before 0.00."""
+    return f"{round(rate, 2) + 0.0:.2f}".replace("-", "\N{MINUS SIGN}")
 
 
 def _fitted_line(axes: Axes, n: Floats, errors: Floats, span: tuple[float, float], colour: str) -> float:

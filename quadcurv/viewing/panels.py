@@ -19,7 +19,9 @@ from quadcurv.viewing.scale import NAN_COLOUR
 from quadcurv.viewing.scene import polydata, surface_style
 
 _COLOURS = "viridis"
-_PIXELS = 1200
+_PIXELS = 1400
+# Inches: beside a panel, of the colour bar, of titles, of the whole figure at least.
+_GAP, _BAR, _HEADING, _NARROW = 0.15, 0.95, 0.35, 2.0
 _MANY = 20_000  # faces, beyond which edges cannot be told apart
 
 
@@ -30,7 +32,7 @@ def surfaces_figure(
     camera: tuple[float, float, float] = (1.0, 1.0, 0.7),
     height: float = 3.2,
 ) -> Figure:
-    """Paint values on surfaces side by side, on one scale.
+    """Paint values on surfaces side by side, all at one size and on one colour scale.
 
     Parameters
     ----------
@@ -44,7 +46,7 @@ def surfaces_figure(
     camera : (x, y, z)
         Direction from the surface to the viewer; z is up.
     height : float
-        Of the figure in inches; the panels give its width.
+        Of the tallest panel in inches; lengths have one scale in all of them.
 
     Returns
     -------
@@ -59,14 +61,17 @@ def surfaces_figure(
     if problem:
         raise NoOpenGLError(problem)
     values = {title: np.ravel(np.asarray(given, float)) for title, (_, given) in panels.items()}
-    images = {title: _picture(mesh, values[title], decades, camera) for title, (mesh, _) in panels.items()}
-    widths = [image.shape[1] / image.shape[0] for image in images.values()]
-    width = 0.9 * height * sum(widths) + 0.3 * len(images) + (0.9 if decades else 0)
-    figure = Figure(figsize=(width, height))
+    view = _axes_of(camera)
+    extent = max(np.ptp(drawn(mesh).points @ view[:2].T, axis=0).max() / 2 for mesh, _ in panels.values())
+    images = [_picture(mesh, values[title], decades, view, extent) for title, (mesh, _) in panels.items()]
+    rows = max(image.shape[0] for image in images)
+    widths = [image.shape[1] * height / rows + _GAP for image in images]
+    figure = Figure(figsize=(max(sum(widths) + _BAR * (decades is not None), _NARROW), height + _HEADING))
     axes = figure.subplots(1, len(images), width_ratios=widths, squeeze=False)
-    for ax, (title, image) in zip(axes.flat, images.items(), strict=True):
+    for ax, title, image in zip(axes.flat, panels, images, strict=True):
         ax.imshow(image, interpolation="antialiased")
-        ax.set_title(title)
+        middle = image.shape[0] / 2
+        ax.set(title=title, ylim=(middle + rows / 2, middle - rows / 2))
         ax.axis("off")
     if decades is not None:
         low, high = (10.0**power for power in decades)
@@ -74,14 +79,25 @@ def surfaces_figure(
         ends = {(True, True): "both", (True, False): "min", (False, True): "max"}
         extend = ends.get((bool((known < low).any()), bool((known > high).any())), "neither")
         scale = ScalarMappable(LogNorm(low, high), _COLOURS)
-        figure.colorbar(scale, ax=axes, label=label, extend=extend, shrink=0.8, aspect=25, pad=0.03)
+        figure.colorbar(scale, ax=axes, label=label, extend=extend, shrink=0.85, aspect=25, pad=0.03)
     return figure
 
 
+def _axes_of(camera: tuple[float, float, float]) -> Floats:
+    """Axes of the picture (3, 3): across, up and towards the viewer, z being up."""
+    towards = np.array(camera) / np.linalg.norm(camera)
+    across = np.cross((0, 0, 1), towards)
+    across /= np.linalg.norm(across)
+    return np.stack((across, np.cross(towards, across), towards))
+
+
 def _picture(
-    mesh: Mesh, values: Floats, decades: tuple[int, int] | None, camera: tuple[float, float, float]
+    mesh: Mesh, values: Floats, decades: tuple[int, int] | None, view: Floats, extent: float
 ) -> NDArray[np.uint8]:
-    """Painted surface, without the empty margin; edges are drawn where they can be told apart."""
+    """Painted surface, without the empty margin; edges are drawn where they can be told apart.
+
+    `extent` is half the length that the picture's side shows.
+    """
     import pyvista as pv
 
     points, faces, on_cells = drawn(mesh)
@@ -106,7 +122,11 @@ def _picture(
             show_scalar_bar=False,
             **style,
         )
-        plotter.view_vector(camera, viewup=(0, 0, 1))
+        flat = points @ view.T
+        centre = (flat.max(axis=0) + flat.min(axis=0)) / 2 @ view
+        plotter.camera_position = (centre + 4 * extent * view[2], centre, view[1])
+        plotter.camera.parallel_scale = 1.02 * extent
+        plotter.reset_camera_clipping_range()
         image = np.asarray(plotter.screenshot(transparent_background=True, return_img=True))
         plotter.close()
     rows, columns = (np.flatnonzero(image[..., 3].any(axis=axis)) for axis in (1, 0))
