@@ -25,6 +25,7 @@ import numpy as np
 from numba import njit
 from numba.core.caching import CompileResultCacheImpl, _Cache
 from numba.core.compiler_lock import global_compiler_lock
+from numba.core.runtime import rtsys
 from numba.core.serialize import dumps
 
 _log = logging.getLogger("quadcurv")
@@ -97,7 +98,7 @@ class _Files(_Cache):
 
     def load_overload(self, sig, target_context):
         """What is kept for a signature, None if there is nothing sound."""
-        target_context.refresh()
+        rtsys.initialize(target_context)  # all else that a compiler needs is not needed to load
         if self._numba is not None:
             with contextlib.suppress(Exception):  # whatever is wrong with it, it is compiled again
                 data = self._file(sig, target_context.codegen()).read_bytes()
