@@ -12,6 +12,7 @@ import os
 import platform
 import subprocess
 import sys
+import tempfile
 import time
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
@@ -301,11 +302,11 @@ def face_jobs(n: int) -> tuple[Jobs, Jobs]:
     ours: Jobs = {}
     for scheme in ("finite_volume", "liu"):
         for kind, (x, f) in lists.items():
-            mesh = qc.QuadMesh(x, f)
+            mesh = qc.QuadMesh(x, f).reordered()
             moved(mesh, x, scheme)
             ours[f"{scheme}, repeated, {kind}"] = partial(moved, mesh, x, scheme)
     for kind, given in lists.items():
-        ours[f"finite_volume, one call, {kind}"] = partial(qc.mean_curvature_normal, given)
+        ours[f"finite_volume, one call, {kind}"] = partial(qc.mean_curvature_normal, given, "finite_volume")
 
     points, faces = lists["natural"]
     cut = triangles(faces)
@@ -396,7 +397,7 @@ def run(points, faces, cut):
     if sys.argv[1] == "libigl":
         return igl.massmatrix(points, cut), igl.cotmatrix(points, cut) @ points
     mesh = qc.QuadMesh(points, faces)
-    return mesh, qc.mean_curvature_normal(mesh)
+    return mesh, qc.mean_curvature_normal(mesh, "finite_volume")
 points, faces = face_lists(16)["natural"]
 run(points, faces, triangles(faces))
 points, faces = face_lists(int(sys.argv[2]))["natural"]
@@ -414,15 +415,39 @@ FIRST_CALL = """
 import numpy as np
 import quadcurv
 x, y = np.meshgrid(*[np.linspace(0, 1, 64)] * 2)
-quadcurv.mean_curvature(quadcurv.QuadGrid(np.stack([x, y, x * y], axis=-1)))
+quadcurv.mean_curvature(quadcurv.QuadGrid(np.stack([x, y, x * y], axis=-1)), "finite_volume")
 """
+COLD = """
+import sys, time
+import numba, numpy as np, scipy.sparse, quadcurv as qc
+x, y = np.meshgrid(*[np.linspace(0, 1, 65)] * 2)
+points = np.stack([x, y, x * y], axis=-1)
+grid = qc.QuadGrid(points[:-1, :-1])
+cells = qc.StaggeredGrid(points[1::2, 1::2], points[::2, ::2])
+verbs = qc.mean_curvature, qc.mean_curvature_normal, qc.dual_areas, qc.stiffness_matrix
+begin = time.process_time()
+if sys.argv[1] == "first verb, grid":
+    qc.mean_curvature(grid, "finite_volume")
+elif sys.argv[1] == "jets, grid and faces":
+    for mesh in grid, grid.to_mesh():
+        qc.principal_curvatures(mesh, "jet")
+else:
+    for mesh in grid, cells, grid.to_mesh():
+        qc.vertex_normals(mesh)
+        for scheme in "finite_volume", "liu":
+            for verb in verbs:
+                verb(mesh, scheme)
+print(time.process_time() - begin)
+"""
+COLD_GOALS = {"first verb, grid": (2.0, 1.5), "all verbs": (6.0, 5.0), "jets, grid and faces": (4.0, 3.0)}
 
 
-def python(code: str, *given: object) -> str:
+def python(code: str, *given: object, **environment: str) -> str:
     """Run code in a fresh process, in the folder that holds this package."""
     command = [sys.executable, "-c", code, *map(str, given)]
-    folder = Path(__file__).parents[1]
-    return subprocess.run(command, cwd=folder, capture_output=True, text=True, check=True).stdout
+    folder, environment = Path(__file__).parents[1], {**os.environ, **environment}
+    done = subprocess.run(command, cwd=folder, env=environment, capture_output=True, text=True, check=True)
+    return done.stdout
 
 
 def memory(n: int) -> tuple[Ratio, dict[str, float]]:
@@ -447,6 +472,21 @@ def first_call(count: int) -> Ratio:
     seconds = [until_there(FIRST_CALL) - until_there("") for _ in range(count)]
     low, median, high = np.quantile(seconds, (0.25, 0.5, 0.75))
     return Ratio("first call, seconds", "bare python", 64 * 64, 1, low, median, high, 1.0, 0.5)
+
+
+def cold_calls(count: int) -> Iterator[Ratio]:
+    """Processor seconds of first calls with nothing compiled, less those of imports.
+
+    All verbs are H, H n, normals, dual areas and stiffness by both schemes on a grid, a staggered grid and a
+    face list.
+    """
+    for name, (must, aim) in COLD_GOALS.items():
+        seconds = []
+        for _ in range(count):
+            with tempfile.TemporaryDirectory() as folder:
+                seconds.append(float(python(COLD, name, NUMBA_CACHE_DIR=folder)))
+        low, median, high = np.quantile(seconds, (0.25, 0.5, 0.75))
+        yield Ratio(f"nothing compiled, seconds, {name}", "imports", 4096, 1, low, median, high, must, aim)
 
 
 def growth(times: Mapping[int, Mapping[str, Floats]]) -> dict[str, float]:
@@ -474,6 +514,7 @@ def measure(quick: bool) -> tuple[list[Ratio], dict[str, dict[int, dict[str, Flo
         n = sizes[-1] if quick else 1024
         used, peak = memory(n) if sys.platform == "linux" else (None, {})
         ratios += [r for r in (used, first_call(3 if quick else 9)) if r]
+        ratios += cold_calls(1 if quick else 5)
     finally:
         qc.set_threads(None)
     if not quick:
@@ -509,14 +550,15 @@ def markdown(
         "Written by `python -m comparisons.performance`. Median and quartiles, over the rounds, of the ratio",
         "of two wall times taken in one round of one process; *must* and *aim* were set beforehand.",
         "Validation is never left out: *one call* checks the mesh, sorts its corners and evaluates;",
-        "*repeated* moves the points of a mesh (`mesh.with_points(points)`, which checks them) and",
-        "evaluates. A *copy* reads and writes the 24 + 24 bytes a vertex that the mean curvature normal",
+        "*repeated* moves the points of a mesh (`mesh.with_points(points)`, which checks them; of",
+        "`mesh.reordered()`, which was made before) and evaluates. A *copy* reads and writes the 24 + 24",
+        "bytes a vertex that the mean curvature normal",
         "reads and writes, on as many threads. Every round has an order of its own. Grids and copies are",
         "called once a round: what they read and write was last used by another of them, and of 65 536",
         "and a million vertices may still be in the last cache. Face lists and their peers are called",
         "again until 0.1 s have passed, and the last call counts. *numpy.take* does nothing but bring",
         "points into a random order: so memory's own cost grows there. *First call* is a fresh process,",
-        "until its result is there.",
+        "until its result is there; *nothing compiled* are processor seconds of one with an empty cache.",
         "",
         f"Python {platform.python_version()}, {os.cpu_count()} cores, {versions()}.",
         "",

@@ -163,3 +163,42 @@ assert os.waitpid(child, 0)[1] == 0
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="no fork")
 def test_a_fork_while_another_thread_compiles_does_not_hang(copy):
     assert copy.run(FORK, "sys.stdout.flush(); os._exit(0)")[0] == 1.0
+
+
+def test_there_is_one_program_for_all_results_areas_and_arrays():
+    """Whatever is wanted of whatever arrays: each kernel is compiled once."""
+    program = """
+import importlib, pkgutil
+import numpy as np
+import quadcurv as qc, quadcurv.kernels
+points = np.random.default_rng(0).random((12, 13, 3))
+faces = qc.QuadGrid(points).stencils().faces.astype(np.int64)
+meshes = [
+    lambda: qc.QuadGrid(points), lambda: qc.QuadGrid(np.asfortranarray(points)),
+    lambda: qc.QuadGrid(points.astype(np.float32), (True, False)),
+    lambda: qc.StaggeredGrid(points[1:11, 1:11], points[:11, :11]),
+    lambda: qc.QuadMesh(points.reshape(-1, 3), faces),
+    lambda: qc.QuadMesh(points.reshape(-1, 3), faces).reordered(),
+]
+verbs = [qc.mean_curvature, qc.mean_curvature_normal, qc.dual_areas, qc.stiffness_matrix]
+for mesh in (make() for make in meshes):
+    qc.vertex_normals(mesh)
+    for scheme in ("finite_volume", "liu"):
+        for verb in verbs:
+            verb(mesh, scheme)
+    qc.evaluate(mesh, "mean_curvature", "mean_curvature_normal", "vertex_normals", "dual_areas", scheme="liu")
+    qc.principal_curvatures(mesh, "jet")
+programs = {}
+for module in pkgutil.iter_modules(quadcurv.kernels.__path__):
+    module = importlib.import_module(f"quadcurv.kernels.{module.name}")
+    for name, kernel in vars(module).items():
+        if hasattr(kernel, "overloads") and kernel.py_func.__module__ == module.__name__:
+            programs[f"{module.__name__}.{name}"] = len(kernel.overloads)
+print({name: count for name, count in programs.items() if count > 1})
+print(sum(programs.values()))
+"""
+    done = subprocess.run([sys.executable, "-W", "ignore", "-c", program], capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    several, total = done.stdout.split("\n")[:2]
+    assert several == "{}"
+    assert int(total) > 15

@@ -14,7 +14,17 @@ def test_quick_run(tmp_path):
     found = performance.main(tmp_path, quick=True)
     report = found["report"].read_text()
     assert found["report"].parent == tmp_path
-    for name in ("copy", "libigl", "VTK", "numpy", "scipy coo->csr", "jet", "peak memory", "first call"):
+    for name in (
+        "copy",
+        "libigl",
+        "VTK",
+        "numpy",
+        "scipy coo->csr",
+        "jet",
+        "peak memory",
+        "first call",
+        "nothing compiled",
+    ):
         assert name in report
     names = {(r.name, r.against, r.threads) for r in found["ratios"]}
     assert ("finite_volume, open grid", "copy", 2) in names
