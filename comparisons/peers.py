@@ -22,11 +22,12 @@ from numpy.typing import NDArray
 from rich.console import Console
 from scipy.stats import spearmanr
 
-from comparisons.common import COLOURS, MARKERS, arguments, figure, paper_style, save_figure, write_csv
-from quadcurv import SCHEMES, Fit, QuadGrid, QuadMesh, Scheme, mean_curvature
+from comparisons.common import arguments
+from comparisons.figures import COLOURS, MARKERS, figure, paper_style, save_figure
+from quadcurv import SCHEMES, Fit, QuadGrid, QuadMesh, mean_curvature
 from quadcurv.estimate import disagreement
 from quadcurv.refinement import fitted_rate
-from quadcurv.schemes import fundamental_forms
+from quadcurv.schemes import Scheme, fundamental_forms
 from quadcurv.surfaces import (
     Surface,
     cubed_ellipsoid,
@@ -35,6 +36,7 @@ from quadcurv.surfaces import (
     pillow_sphere,
     torus,
 )
+from quadcurv.tables import by_column, write_csv
 
 Array = NDArray[np.float64]
 OURS = "quadcurv"
@@ -518,8 +520,8 @@ def draw(records: Sequence[dict[str, Any]], output: Path) -> None:
         ax.set_ylabel("mean error of $H$ (1/length)")
     handles, labels = axes[0, 0].get_legend_handles_labels()
     fig.legend(handles, labels, loc="outside lower center", ncols=3)
-    columns = {k: [r[k] for r in records] for k in records[0]}
-    save_figure(fig, output, "peers", columns)
+    save_figure(fig, output, "peers")
+    write_csv(output / "peers.csv", by_column(records))
 
 
 def main() -> None:
@@ -533,8 +535,7 @@ def main() -> None:
     draw(records, options.output)
     cost = costs(methods, cost_size)
     write_csv(
-        options.output,
-        "peers_cost",
+        options.output / "peers_cost.csv",
         {
             "method": list(cost),
             "microseconds": [c[0] for c in cost.values()],

@@ -25,7 +25,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 import quadcurv as qc
-from comparisons.common import COLOURS, MARKERS, arguments, figure, paper_style, save_figure
+from comparisons.common import arguments
+from comparisons.figures import COLOURS, MARKERS, figure, paper_style, save_figure
 from quadcurv.kernels import quad, ranges, vector
 from quadcurv.schemes.diamond import quad_stiffness
 

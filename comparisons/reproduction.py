@@ -3,190 +3,67 @@
 from __future__ import annotations
 
 import re
-import time
+import sys
 from collections import Counter
-from collections.abc import Sequence
-from dataclasses import replace
+from collections.abc import Iterable
+from concurrent.futures import ProcessPoolExecutor
 from importlib import import_module
+from multiprocessing import get_context
 from pathlib import Path
 
-import numpy as np
 from rich.console import Console
 
-from comparisons import beyond
-from comparisons.common import OUTPUT, Claim, arguments, below, claims_markdown, print_claims
-from quadcurv import QuadGrid, QuadMesh, mean_curvature
-from quadcurv.refinement import convergence
-from quadcurv.surfaces import cubed_ellipsoid, torus
-
-Results = dict[str, float]
+from comparisons import overall
+from comparisons.claims import Claim, Judgement, judge, markdown, print_judgements
+from comparisons.common import OUTPUT, arguments, draw, measure, report_changes, save_series
+from quadcurv.tables import WIDTH
 
 REPORT = Path(__file__).with_name("REPRODUCTION.md")
-CHAPTERS = {
-    "chapter2": "Chapter 2: curves",
-    "chapter3": "Chapter 3: surfaces",
-    "chapter4": "Chapter 4: other formulas",
-}
+SCRIPTS = ("chapter2", "chapter3", "chapter4", "beyond", "functions")
 FIGURES = {2: 7, 3: 12, 4: 4}  # figures of each chapter
-NUMBER = re.compile(r"(?<![\w.^])-?\d+(?:\.\d+)?(?:e[-+]\d+)?")
+NUMBER = re.compile(r"(?<![\w.^])-?\d+(?:\.\d+)?(?:e-?\d+)?")
+TWO_PLACES = re.compile(r"-?\d\.\d\d")
+_WORKERS = 2
 UNITS_OF_ROUNDING = re.compile(r"[\d.]+ eps")
-ROUNDING = re.compile(r"(?<!below )\b\d(?:\.\d+)?e-1[1-9]\b")
 
 
-def as_face_list() -> float:
-    """Largest difference of H between a grid and the same quads as a shuffled face list."""
-    grid, *_ = torus().sample((48, 48))
-    assert isinstance(grid, QuadGrid)
-    faces = grid.to_mesh().faces
-    rng = np.random.default_rng(0)
-    start = (rng.integers(4, size=(len(faces), 1)) + np.arange(4)) % 4
-    shuffled = rng.permutation(np.take_along_axis(faces, start, axis=1))
-    H = mean_curvature(QuadMesh(grid.points.reshape(-1, 3), shuffled), "finite_volume")
-    return float(np.abs(H - mean_curvature(grid, "finite_volume").ravel()).max())
+def numbers_of_all(found: Iterable[dict[str, float]]) -> dict[str, float]:
+    """Numbers of several scripts in one dict.
+
+    Raises
+    ------
+    ValueError
+        Two scripts have a number of one name.
+    """
+    together: dict[str, float] = {}
+    for numbers in found:
+        twice = together.keys() & numbers
+        if twice:
+            raise ValueError(f"numbers of one name in two scripts: {sorted(twice)}")
+        together |= numbers
+    return together
 
 
-def mixed(n: int = 32) -> Results:
-    """One-norm of the error on an ellipsoid of which every third quad, at random, is cut in two."""
-    mesh, xi, eta = cubed_ellipsoid().sample((n, n), "faces")
-    assert isinstance(mesh, QuadMesh)
-    faces = np.array(mesh.faces)
-    cut = np.random.default_rng(0).random(len(faces)) < 1 / 3
-    quads, halves = faces[~cut], faces[cut]
-    triangles = np.concatenate((halves[:, [0, 1, 2]], halves[:, [2, 3, 0]]))
-    pieces = np.concatenate((quads, np.pad(triangles, ((0, 0), (0, 1)), constant_values=-1)))
-    exact = cubed_ellipsoid().mean_curvature(xi, eta)
+def sections() -> dict[str, list[Claim]]:
+    """Claims by the title of their section, in the order of the report."""
+    scripts = [import_module(f"comparisons.{name}") for name in SCRIPTS]
+    chapters = {script.TITLE: script.CLAIMS for script in scripts if script.TITLE.startswith("Chapter")}
+    rest = {script.TITLE: script.CLAIMS for script in scripts if script.TITLE not in chapters}
     return {
-        f"mixed mesh, {scheme}": float(
-            np.abs(mean_curvature(QuadMesh(mesh.points, pieces), scheme) - exact).mean()
-        )
-        for scheme in ("finite_volume", "liu")
+        "Chapter 1: introduction": overall.FIRST,
+        **chapters,
+        "Chapter 5: conclusion": overall.LAST,
+        **rest,
     }
 
 
-def conclusions() -> Results:
-    """Numbers behind chapters 1 and 5 that no other script measures."""
-    results: Results = {"grid against shuffled faces": as_face_list(), **mixed()}
-    for layout in ("staggered", "grid"):
-        run = convergence(torus(), ("finite_volume", "cotan-6"), (64, 128), layout)
-        fv, cotan = (run.errors[s]["one"][-1] for s in run.schemes)
-        results[f"torus, {layout}: finite_volume over cotan-6"] = float(fv / cotan)
-    xi, eta, d = 0.0, 1.0, 1e-5
-    tangents = np.stack(
-        (
-            torus().mapping(xi + d, eta) - torus().mapping(xi - d, eta),
-            torus().mapping(xi, eta + d) - torus().mapping(xi, eta - d),
-        )
-    ) / (2 * d)
-    H, K = torus().mean_curvature(xi, eta), torus().gaussian_curvature(xi, eta)
-    first, second = np.linalg.eigvalsh(tangents @ tangents.T)
-    root = np.sqrt(H**2 - K)
-    return results | {
-        "1.1.1 metric, smaller": float(first),
-        "1.1.1 metric, larger": float(second),
-        "1.1.1 curvature, smaller": float(H - root),
-        "1.1.1 curvature, larger": float(H + root),
-    }
-
-
-def overall_claims(results: dict[str, Results]) -> tuple[list[Claim], list[Claim]]:
-    """Claims of chapter 1 and of chapter 5, from the results of all scripts."""
-    own, curves, surfaces = results["conclusions"], results["chapter2"], results["chapter3"]
-    lines = results["beyond"]
-    first = [
-        Claim(
-            "1.1.1",
-            "The principal curvatures are the eigenvalues of the metric tensor",
-            "at eta = 1 on the torus the eigenvalues of the metric tensor are "
-            f"{own['1.1.1 metric, smaller']:.2f} and {own['1.1.1 metric, larger']:.2f}, the principal "
-            f"curvatures {own['1.1.1 curvature, smaller']:.2f} and {own['1.1.1 curvature, larger']:.2f}: "
-            "those of the shape operator",
-            "slip",
-        )
-    ]
-    last = [
-        Claim(
-            "5",
-            "Exact for the line and the circle, second order on the ellipse",
-            f"circle on even spacing {below(curves['circle error to 256'], 10)}; ellipse rate "
-            f"{curves['ellipse primal/dual rate']:.2f}; conditions under chapter 2",
-            "reproduced",
-        ),
-        Claim(
-            "5",
-            "Exact for the cylinder, second order in the one-norm on two grids of the sphere",
-            f"cylinder {below(surfaces['cylinder: largest error'], 11)}; rates "
-            f"{surfaces['pillow_sphere: one-norm rate']:.2f} (pillow) and "
-            f"{surfaces['sphere: one-norm rate']:.2f} (longitude-latitude)",
-            "reproduced",
-        ),
-        Claim(
-            "5",
-            "An improvement upon the cotan formula on quadrilateral meshes",
-            "one-norm of the error over that of cotan with valence 6, torus, 128 cells: "
-            f"{own['torus, staggered: finite_volume over cotan-6']:.2f} on primal/dual points, but "
-            f"{own['torus, grid: finite_volume over cotan-6']:.2f} on the vertices of a grid",
-            "reproduced only if ...",
-        ),
-        Claim(
-            "5",
-            "Given a complete mesh the scheme requires fewer calculations than Liu's formula",
-            "as printed, each point on its own: "
-            f"{surfaces['operations: as printed, each cell on its own']:.0f} operations against "
-            f"{surfaces['operations: Liu as printed']:.0f}. Both have the same fluxes; computed once a "
-            f"quad they take {surfaces['operations: vertices']:.0f} against "
-            f"{surfaces['operations: Liu, vertices']:.0f}, Liu's area being the cheaper one",
-            "reproduced only if ...",
-        ),
-        Claim(
-            "5",
-            "On listings of faces Liu's formula needs no one-ring and takes triangles among the quads; with "
-            "additional work so could the scheme",
-            "its sums run over quads as well. H of a grid and of the same quads in random order differ by "
-            f"{below(own['grid against shuffled faces'], 10)}; with every third quad of an ellipsoid cut in "
-            f"two the one-norm of its error is {own['mixed mesh, finite_volume']:.1e}, that of Liu's "
-            f"{own['mixed mesh, liu']:.1e}",
-            "reproduced",
-        ),
-        Claim(
-            "5",
-            "Neither scheme has been proven to converge over such meshes",
-            "neither does where the mesh is not smooth: with points moved by 5 % of the spacing the one-norm "
-            f"of the error stays at {lines['jitter 5 %, finite_volume: one-norm, at 128']:.3f} and "
-            f"{lines['jitter 5 %, liu: one-norm, at 128']:.3f}",
-            "reproduced",
-        ),
-    ]
-    return first, last
-
-
-def linked(claim: Claim) -> Claim:
-    """Numbers of figures in `where` as links to the pictures."""
-    text, figures, numbers = claim.where.partition("Figure")
-    links = re.sub(r"(\d)\.(\d+)", r"[\1.\2](output/figure_\1_\2.png)", numbers)
-    return replace(claim, where=text + figures + links)
-
-
-def table(claims: Sequence[Claim]) -> str:
-    """Claims as a Markdown table with links; errors that are rounding appear as a bound."""
-    return ROUNDING.sub("< 1e-10", claims_markdown([linked(c) for c in claims])).rstrip()
-
-
-def findings_table(rows: Sequence[tuple[str, str, str]]) -> str:
-    """Findings of `beyond` as a Markdown table."""
-    lines = [f"| {question} | {answer} | [figure](output/{stem}.png) |" for question, answer, stem in rows]
-    return "\n".join(["| question | measured | figure |", "| --- | --- | --- |", *lines])
-
-
-def report(results: dict[str, Results]) -> str:
+def report(judged: dict[str, list[Judgement]]) -> str:
     """Text of REPRODUCTION.md."""
-    first, last = overall_claims(results)
-    sections = {"Chapter 1: introduction": first}
-    for name, title in CHAPTERS.items():
-        sections[title] = import_module(f"comparisons.{name}").claims(results[name])
-    sections["Chapter 5: conclusion"] = last
-    count = Counter(claim.verdict for claims in sections.values() for claim in claims)
+    everything = [j for judgements in judged.values() for j in judgements]
+    thesis = [j for j in everything if j.claim.verdict != "holds"]
+    count = Counter(j.verdict for j in thesis)
     verdicts = ", ".join(f"{count[v]} {v.rstrip(' .')}" for v in sorted(count, key=lambda v: -count[v]))
-    figures = (
+    figures = ", ".join(
         f"[{chapter}.{k}](output/figure_{chapter}_{k}.png)"
         for chapter, n in FIGURES.items()
         for k in range(1, n + 1)
@@ -198,40 +75,59 @@ def report(results: dict[str, Results]) -> str:
         "Meshes*, MSc thesis, Boise State University, 2013. Written by `python -m comparisons.reproduction`, "
         "which also makes the figures; not edited by hand.",
         "",
-        f"{sum(count.values())} claims: {verdicts}. A slip is a printed formula or reason that does not "
-        "hold; what does is beside it. Curvatures are in 1/length. kappa is the norm of the mean curvature "
-        "normal, H its signed length, positive on a sphere oriented outward.",
+        f"{len(thesis)} claims: {verdicts}. A slip is a printed formula or reason that does not hold; what "
+        "does is beside it. Every number is measured; *required* are the ranges in which they must lie, in "
+        "their order, for the verdict: where one leaves its range the verdict falls, and the script exits "
+        "with 1. Curvatures are in 1/length. kappa is the norm of the mean curvature normal, as in the "
+        "thesis, H its signed length, positive on a sphere oriented outward. Layouts: the thesis says (4.1) "
+        "that it compared the stencil of Figure 4.1, on the vertices of a mesh; but its Figures 4.2 to 4.4 "
+        "are those of primal and dual points, on which alone the scheme is exact on the cylinder. Both are "
+        "measured.",
         "",
-        "Figures: " + ", ".join(figures) + ".",
+        f"Figures: {figures}.",
     ]
-    for title, claims in sections.items():
-        lines += ["", f"## {title}", "", table(claims)]
-    lines += ["", "## Beyond the thesis", "", findings_table(beyond.findings(results["beyond"]))]
+    for title, judgements in judged.items():
+        lines += ["", f"## {title}", "", markdown(judgements).rstrip()]
     return "\n".join(lines) + "\n"
 
 
 def drift(fresh: str, committed: str) -> list[str]:
-    """Lines of a fresh report that a committed one does not say: in other words, or 5 % off in a number.
+    """Lines of a fresh report that a committed one does not say: in other words, or off in a number.
 
-    Multiples of eps are not compared: machines differ in them.
+    Numbers may differ by 5 %, rates and the like of two decimal places by 0.02; multiples of eps are not
+    compared. Machines differ in them.
     """
 
-    def words_and_numbers(line: str) -> tuple[str, list[float]]:
+    def words_and_numbers(line: str) -> tuple[str, list[str]]:
         line = UNITS_OF_ROUNDING.sub("some eps", line)
-        return NUMBER.sub("#", line), [float(number) for number in NUMBER.findall(line)]
+        return NUMBER.sub("#", line), NUMBER.findall(line)
 
-    said: dict[str, list[list[float]]] = {}
+    def near(new: str, old: str) -> bool:
+        slack = 0.02 if TWO_PLACES.fullmatch(new) and TWO_PLACES.fullmatch(old) else 0.0
+        return abs(float(new) - float(old)) <= 0.05 * abs(float(old)) + slack
+
+    said: dict[str, list[list[str]]] = {}
     for words, numbers in map(words_and_numbers, committed.splitlines()):
         said.setdefault(words, []).append(numbers)
     return [
         line
         for line in fresh.splitlines()
         for words, numbers in [words_and_numbers(line)]
-        if not any(np.allclose(numbers, known, rtol=0.05, atol=0) for known in said.get(words, []))
+        if not any(all(map(near, numbers, known)) for known in said.get(words, []))
     ]
 
 
-def main(output: Path, quick: bool = False, console: Console | None = None) -> dict[str, Results]:
+def run(name: str, output: Path, quick: bool) -> dict[str, float]:
+    """Numbers of one script; its columns and, unless it is to be quick, its figures go to a folder."""
+    script = import_module(f"comparisons.{name}")
+    found = measure(script, f"{name}: ")
+    save_series(found, output)
+    if not quick and hasattr(script, "FIGURES"):
+        draw(script, found, output, f"{name}: ")
+    return found.numbers
+
+
+def main(output: Path, quick: bool = False) -> dict[str, list[Judgement]]:
     """Run all scripts and write the report.
 
     Parameters
@@ -240,14 +136,12 @@ def main(output: Path, quick: bool = False, console: Console | None = None) -> d
         Folder of the figures; of a quick run also of REPRODUCTION.md, which else goes beside this file
         and links to ``output`` there.
     quick : bool
-        As for the scripts.
-    console : rich.console.Console, optional
-        Where the progress is shown.
+        No figures; all numbers are the same.
 
     Returns
     -------
     dict
-        Results by script, and "conclusions".
+        Judgements by section.
 
     Raises
     ------
@@ -256,26 +150,20 @@ def main(output: Path, quick: bool = False, console: Console | None = None) -> d
     """
     if not quick and output.resolve() != OUTPUT.resolve():
         raise ValueError(f"output: the report beside {Path(__file__).name} links to figures in {OUTPUT}")
-    console = console or Console()
-    results: dict[str, Results] = {}
-    scripts = {**CHAPTERS, "beyond": "Beyond the thesis"}
-    for i, (name, title) in enumerate(scripts.items(), 1):
-        console.print(f"[{i}/{len(scripts)}] {title} ...", markup=False)
-        start = time.perf_counter()
-        results[name] = import_module(f"comparisons.{name}").main(output, quick)
-        console.print(f"    {time.perf_counter() - start:.0f} s")
-    results["conclusions"] = conclusions()
+    names = (*SCRIPTS, "overall")
+    with ProcessPoolExecutor(min(len(names), _WORKERS), get_context("spawn")) as pool:
+        numbers = list(pool.map(run, names, [output] * len(names), [quick] * len(names)))
+    together = numbers_of_all(numbers)
+    judged = {title: judge(claims, together) for title, claims in sections().items()}
     path = output / REPORT.name if quick else REPORT
-    path.write_text(report(results), encoding="utf-8")
-    console.print(f"Figures in {output}, report in {path}")
-    return results
+    path.write_text(report(judged), encoding="utf-8")
+    print(f"figures in {output}, report in {path}", file=sys.stderr)
+    return judged
 
 
 if __name__ == "__main__":
     options = arguments(__doc__)
     found = main(options.output, options.quick)
-    for name, title in CHAPTERS.items():
-        print_claims(import_module(f"comparisons.{name}").claims(found[name]), title)
-    for title, claims in zip(("Chapter 1", "Chapter 5"), overall_claims(found), strict=True):
-        print_claims(claims, title)
-    beyond.print_findings(found["beyond"])
+    for title, judgements in found.items():
+        print_judgements(judgements, title, Console(width=min(WIDTH, Console().width)))
+    sys.exit(report_changes([j for judgements in found.values() for j in judgements]))

@@ -1,26 +1,33 @@
 import numpy as np
 import pytest
+from scripts import assert_as_declared, assert_one_size_of_type, drawn
 
-from comparisons import beyond, reproduction
-from quadcurv import mean_curvature
-from quadcurv.surfaces import tanh_sheet
+from comparisons import beyond, common
+from comparisons.beyond import measure
+from quadcurv import QuadGrid, mean_curvature
+from quadcurv.surfaces import catenoid, tanh_sheet
 
 FIGURES = ["boundaries", "extraordinary", "jitter", "valence_8"]
 
 
 @pytest.fixture(scope="module")
-def output(tmp_path_factory):
-    return tmp_path_factory.mktemp("beyond") / "new"
+def found():
+    return common.measure(beyond)
 
 
 @pytest.fixture(scope="module")
-def results(output):
-    return beyond.main(output, quick=True)
+def results(found):
+    return found.numbers
 
 
-def test_files(output, results) -> None:
-    expected = {f"beyond_{name}.{kind}" for name in FIGURES for kind in ("png", "svg", "csv")}
-    assert {file.name for file in output.iterdir()} == expected
+def test_verdicts_and_report(found) -> None:
+    assert_as_declared(beyond, found)
+
+
+def test_figures(found) -> None:
+    made = drawn(beyond, found)
+    assert set(made) == {f"beyond_{name}" for name in FIGURES}
+    assert_one_size_of_type(made)
 
 
 @pytest.mark.parametrize(
@@ -43,17 +50,25 @@ def test_boundaries(results, surface, none, quadratic, cubic, quartic, inside) -
         assert results[f"border, {surface}: {name}, rate"] == pytest.approx(rate, abs=tolerance)
 
 
-def test_quartic_ghosts_are_those_of_the_package() -> None:
-    grid, xi, eta = tanh_sheet().sample((32, 32))
-    e = np.abs(mean_curvature(grid, "finite_volume") - tanh_sheet().mean_curvature(xi, eta))
-    border = np.ones(grid.shape, bool)
-    border[1:-1, 1:-1] = False
-    found = beyond.border_errors(tanh_sheet(), 32, 4)
-    assert found == pytest.approx((e[border].max(), e[~border].max()), rel=1e-9)
+@pytest.mark.parametrize("surface", [tanh_sheet(), catenoid()], ids=lambda s: s.name)
+def test_quartic_ghosts_are_those_of_the_package(surface) -> None:
+    grid, *_ = surface.sample((32, 32))
+    np.testing.assert_allclose(
+        measure.border_curvature(grid, 4), mean_curvature(grid, "finite_volume"), atol=1e-11
+    )
+
+
+def test_ghosts_continue_polynomials() -> None:
+    x, y = np.meshgrid(np.arange(7.0), np.arange(6.0), indexing="ij")
+    for degree in (2, 3, 4):
+        grid = QuadGrid(np.stack((x, y, x**degree - y * x), axis=-1))
+        X, Y, Z = np.moveaxis(measure.with_ghosts(grid, degree).points, -1, 0)
+        assert X.shape == (9, 8)
+        np.testing.assert_allclose(Z, X**degree - Y * X, atol=1e-9)
 
 
 def test_icosahedral_sphere() -> None:
-    mesh = beyond.icosahedral_sphere(4)
+    mesh = measure.icosahedral_sphere(4)
     valence = mesh.stencils().valence
     assert np.bincount(valence).tolist() == [0, 0, 0, 20, len(valence) - 32, 12]
     assert len(mesh.points) - 2 * len(mesh.faces) + len(mesh.faces) == 2
@@ -143,15 +158,8 @@ def test_areas_on_the_vertices_of_a_cylinder(results) -> None:
     assert results["areas: barycentric over Voronoi, valence 4"] == pytest.approx(2 / 3, abs=1e-3)
 
 
-def test_map(tmp_path, monkeypatch) -> None:
-    drawn = {}
-    monkeypatch.setattr(beyond, "save_maps", lambda output, stem, panels, *_: drawn.update({stem: panels}))
-    beyond.extraordinary_map(tmp_path)
-    for mesh, e in drawn["beyond_extraordinary_map"].values():
+def test_map() -> None:
+    maps = beyond.MAPS["beyond_extraordinary_map"]()
+    for mesh, e in maps.panels.values():
         assert e.shape == (len(mesh.points),)
         assert 1e-3 < e.max() < 0.1
-
-
-def test_report_says_what_is_measured(results) -> None:
-    committed = reproduction.REPORT.read_text(encoding="utf-8")
-    assert not reproduction.drift(reproduction.findings_table(beyond.findings(results)), committed)

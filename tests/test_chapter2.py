@@ -1,12 +1,16 @@
+from __future__ import annotations
+
 import csv
-import io
 
 import numpy as np
 import pytest
-from rich.console import Console
+from scripts import assert_as_declared, assert_one_size_of_type, drawn
 
-from comparisons import chapter2, common
+from comparisons import chapter2, common, figures, fresnel
+from comparisons.chapter2 import measure
+from comparisons.measured import Columns, rate_in
 from quadcurv.curves import curvature, euler_spiral, staggered
+from quadcurv.tables import write_csv
 
 FIGURES = ["2_1", "2_2", "2_3", "2_4", "2_5", "2_6", "2_7", "2_exact", "2_open_ends", "2_uneven"]
 
@@ -17,42 +21,51 @@ def output(tmp_path_factory):
 
 
 @pytest.fixture(scope="module")
-def results(output):
-    return chapter2.main(output, quick=True)
+def found(output):
+    return common.main(chapter2, output)
 
 
-def test_files(output, results) -> None:
+def test_files(output, found) -> None:
     expected = {f"figure_{name}.{kind}" for name in FIGURES for kind in ("png", "svg", "csv")}
     assert {file.name for file in output.iterdir()} == expected - {"figure_2_1.csv"}
     with open(output / "figure_2_3.csv", newline="") as file:
         rows = list(csv.DictReader(file))
     assert [int(row["n"]) for row in rows] == [16, 32, 64, 128, 256, 512, 1024]
-    assert float(rows[4]["polyline"]) == results["ellipse polyline error at 256"]
+    assert float(rows[4]["polyline"]) == found.numbers["ellipse polyline, error at 256"]
+
+
+def test_verdicts_and_report(found) -> None:
+    assert_as_declared(chapter2, found)
+
+
+def test_figures(found) -> None:
+    assert_one_size_of_type(drawn(chapter2, found))
 
 
 @pytest.mark.parametrize(
     ("name", "value", "tolerance"),
     [
-        ("ellipse primal/dual rate", 2.0, 0.01),
-        ("ellipse polyline rate", 2.0, 0.01),
+        ("ellipse primal/dual points, rate", 2.0, 0.01),
+        ("ellipse polyline, rate", 2.0, 0.01),
         ("spiral rate", 4.0, 0.1),
-        ("helix curvature rate", 2.0, 0.02),
-        ("helix torsion rate", 2.0, 0.02),
-        ("arc curvature end rate", 2.0, 0.05),
-        ("helix torsion end rate", 2.0, 0.15),
-        ("uneven circle rate, polyline", 2.0, 0.1),
-        ("uneven helix torsion rate, three edges", 2.0, 0.2),
-        ("arc curvature end error over inside at 256", 1.0, 0.1),
-        ("helix torsion end error over inside at 256", 1.0, 0.2),
+        ("helix curvature, rate", 2.0, 0.02),
+        ("helix torsion, rate", 2.0, 0.02),
+        ("arc curvature, rate at the ends", 2.0, 0.05),
+        ("helix torsion, rate at the ends", 2.3, 0.15),
+        ("uneven, polyline, rate", 2.0, 0.1),
+        ("uneven, torsion, rate", 2.0, 0.2),
+        ("arc curvature, ends over inside at 256", 1.0, 0.1),
+        ("helix torsion, ends over inside at 256", 1.7, 0.1),
         ("2.45 x component of H at t = 0", -1.0, 1e-12),
         ("2.54 printed torsion of the helix", 0.8, 0.003),
         ("2.54 corrected torsion of the helix", 0.4, 3e-5),
-        ("uneven circle error at 256, primal halfway", 0.86, 0.01),
-        ("uneven helix torsion error at 256, one edge", 0.70, 0.01),
+        ("uneven, primal halfway, error at 256", 0.86, 0.01),
+        ("uneven, printed torsion, error at 256", 0.32, 0.01),
+        ("torsion of the left-handed helix", -0.4, 3e-4),
     ],
 )
-def test_measured(results, name, value, tolerance) -> None:
-    assert results[name] == pytest.approx(value, abs=tolerance)
+def test_measured(found, name, value, tolerance) -> None:
+    assert found.numbers[name] == pytest.approx(value, abs=tolerance)
 
 
 @pytest.mark.parametrize(
@@ -60,35 +73,26 @@ def test_measured(results, name, value, tolerance) -> None:
     [
         ("circle error to 256", 1e-12),
         ("line turn to 256", 1e-12),
-        ("ellipse primal/dual error at 256", 5e-4),
-        ("ellipse polyline error at 256", 1e-3),
+        ("ellipse primal/dual points, error at 256", 5e-4),
+        ("ellipse polyline, error at 256", 1e-3),
         ("spiral error at 8192", 1.6e-9),
-        ("spiral error at 32768 over eps/h^2", 10),
-        ("helix curvature error at 256", 3.3e-5),
-        ("helix torsion error at 256", 9.8e-5),
-        ("uneven circle error at 256, dual halfway", 2e-12),
-        ("uneven circle error at 256, polyline", 2e-5),
-        ("uneven helix torsion error at 256, three edges", 2e-4),
+        ("spiral, computed, at 32768 over eps/h^2", 10),
+        ("helix curvature, error at 256", 3.3e-5),
+        ("helix torsion, error at 256", 2.5e-5),
+        ("uneven, dual halfway, error at 256", 2e-12),
+        ("uneven, polyline, error at 256", 2e-5),
+        ("uneven, torsion, error at 256", 7e-5),
         ("2.31 largest cosine of printed and exact normal", 0.03),
     ],
 )
-def test_bounds(results, name, bound) -> None:
-    assert 0 < results[name] < bound
+def test_bounds(found, name, bound) -> None:
+    assert 0 < found.numbers[name] < bound
 
 
-def test_claims(results) -> None:
-    claims = chapter2.claims(results)
-    verdicts = {c.where: c.verdict for c in claims}
-    assert verdicts["(2.31)"] == verdicts["(2.54)"] == verdicts["(2.48)"] == "slip"
-    assert verdicts["2.1.4, Figure 2.3"] == "reproduced"
-    console = Console(file=io.StringIO(), width=200)
-    common.print_claims(claims, "Chapter 2", console)
-    printed = console.file.getvalue()
-    markdown = common.claims_markdown(claims)
-    for c in claims:
-        assert c.where in printed
-        assert c.claim.replace("|", "\\|") in markdown
-    assert {line.replace("\\|", "").count("|") for line in markdown.splitlines()} == {5}
+def test_rounding_of_integrals_and_of_positions(found) -> None:
+    shares = [found.numbers[f"spiral, {k}, at 32768 over eps/h^2"] for k in ("computed", "rounded", "exact")]
+    assert shares[0] > 1.8 * shares[1]
+    assert shares[1] > 1.2 * shares[2]
 
 
 def test_precision_of_the_fresnel_integrals() -> None:
@@ -112,41 +116,50 @@ def test_precision_of_the_fresnel_integrals() -> None:
     assert 3 * errors[1] < errors[0] < 10 * unavoidable
 
 
-def test_convergence_plot() -> None:
-    _, axes = common.figure()
-    n = np.array([8, 16, 32, 64])
-    series = {"exact": [0.0] * 4, "second": 3.0 / n**2, "partly": [1.0, np.nan, 0.0, 0.1]}
-    fit = {"second": (16, 64), "exact": (8, 64)}
-    rates = common.convergence_plot(axes, n, series, fit, slopes=(1, 2), rounding=(1e-16 * n**2.0, "eps"))
-    assert rates["second"] == pytest.approx(2)
-    assert np.isnan(rates["exact"])
-    labels = [text.get_text() for text in axes.get_legend().get_texts()]
-    assert labels == ["exact", "second: rate 2.00", "partly", "range of the fit", "rounding, eps"]
-    dashed = [line.get_xdata()[0] for line in axes.lines if line.get_linestyle() == "--"]
-    assert dashed == [8, 16, 64]
-    open_markers = [line for line in axes.lines if line.get_fillstyle() == "none"]
-    assert [len(line.get_xdata()) for line in open_markers] == [4, 1]
-    assert all((line.get_ydata() == axes.get_ylim()[0]).all() for line in open_markers)
+def test_fresnel_integrals_are_good_to_the_last_place() -> None:
+    mpmath = pytest.importorskip("mpmath")
+    t = np.linspace(-30, 30, 2 * 4096 - 1)
+    steps = fresnel.increments(t)
+    points = fresnel.positions(steps)
+    with mpmath.workdps(40):
+        unit = mpmath.sqrt(mpmath.pi / 2)
+        for j in (0, 1234, 4000, 4095, 4096, 7000, 8189):
+            first, last = (mpmath.mpf(float(x)) / unit for x in t[j : j + 2])
+            for k, f in enumerate((mpmath.fresnelc, mpmath.fresnels)):
+                exact = unit * (f(last) - f(first))
+                assert abs(steps[j, k] - exact) < 4e-16 * np.linalg.norm(steps[j])
+                assert abs(points[j + 1, k] - unit * f(last)) < 2.3e-16
+    assert (points[len(points) // 2] == 0).all()
+
+
+def test_the_spiral_is_quartic_on_even_steps_of_its_length_alone(found) -> None:
+    assert found.numbers["spiral rate"] > 3.9
+    assert found.numbers["spiral rate on steps that vary slowly"] == pytest.approx(2, abs=0.02)
 
 
 def test_figures_are_the_same_on_every_run(tmp_path) -> None:
-    @common.paper_style
+    @figures.paper_style
     def draw(folder) -> None:
-        fig, axes = common.figure()
+        fig, axes = figures.figure()
         axes.plot([1, 2, 3], label="a")
         axes.legend()
-        common.save_figure(fig, folder, "figure", {"x": [1, 2], "y": [0.1, 1 / 3]})
+        figures.save_figure(fig, folder, "figure")
 
     for folder in ("first", "second"):
         draw(tmp_path / folder)
-    for kind in ("png", "svg", "csv"):
+    for kind in ("png", "svg"):
         assert len({(tmp_path / f / f"figure.{kind}").read_bytes() for f in ("first", "second")}) == 1
-    assert (tmp_path / "first" / "figure.csv").read_text() == "x,y\n1,0.1\n2,0.3333333333333333\n"
 
 
-def test_columns_of_different_lengths(tmp_path) -> None:
-    with pytest.raises(ValueError, match="columns: expected one length"):
-        common.write_csv(tmp_path, "table", {"a": [1, 2], "b": [1]})
+def test_columns(tmp_path) -> None:
+    columns = Columns({"n": np.array([8, 16, 32]), "e": [1.0, 0.25, 0.0625]})
+    assert columns.at(16, "e") == 0.25
+    assert rate_in(columns, "e", 8) == pytest.approx(2)
+    assert np.isnan(rate_in(Columns({"n": [8, 16], "e": [1.0, 0.0]}), "e", 8))
+    write_csv(tmp_path / "a.csv", {"x": [1, 2], "y": [0.1, 1 / 3]})
+    assert (tmp_path / "a.csv").read_text() == "x,y\n1,0.1\n2,0.3333333333333333\n"
+    with pytest.raises(ValueError, match="length"):
+        write_csv(tmp_path / "b.csv", {"a": [1, 2], "b": [1]})
 
 
 def test_command_line(monkeypatch, tmp_path) -> None:
@@ -156,3 +169,29 @@ def test_command_line(monkeypatch, tmp_path) -> None:
     assert options.output == tmp_path
     monkeypatch.setattr("sys.argv", ["chapter2"])
     assert common.arguments(None).output.parts[-2:] == ("comparisons", "output")
+
+
+@pytest.mark.parametrize("spoiled", [False, True])
+def test_command_prints_claims_first_in_80_columns_and_exits(monkeypatch, tmp_path, capsys, spoiled) -> None:
+    steps = {name: chapter2.STEPS[name] for name in chapter2.STEPS}
+    if spoiled:
+        steps["ellipse"] = lambda into: (
+            measure.ellipse_convergence(into),
+            into.numbers.update({"ellipse primal/dual points, rate": 1.0}),
+        )
+    monkeypatch.setattr(chapter2, "STEPS", steps)
+    monkeypatch.setattr("sys.argv", ["chapter2", "--quick", "--output", str(tmp_path)])
+    with pytest.raises(SystemExit) as stop:
+        common.command(chapter2)
+    assert stop.value.code == int(spoiled)
+    printed, progress = capsys.readouterr()
+    lines = printed.splitlines()
+    assert max(map(len, lines[:-1])) <= 80
+    assert lines[0].startswith("Chapter 2")
+    assert printed.index("The curvature of a straight line") < printed.index(
+        "Ellipse: largest error of kappa"
+    )
+    assert "[2/7] ellipse: " in progress
+    assert ("ellipse primal/dual points, rate = 1, required 2 ± 0.05" in progress) == spoiled
+    assert not list(tmp_path.glob("*.png"))
+    assert len(list(tmp_path.glob("*.csv"))) == 9
