@@ -80,8 +80,8 @@ def report(judged: dict[str, list[Judgement]]) -> str:
         "their order, for the verdict: where one leaves its range the verdict falls, and the script exits "
         "with 1. Curvatures are in 1/length. kappa is the norm of the mean curvature normal, as in the "
         "thesis, H its signed length, positive on a sphere oriented outward. Layouts: the thesis says (4.1) "
-        "that it compared the stencil of Figure 4.1, on the vertices of a mesh; but its Figures 4.2 to 4.4 are "
-        "those of primal and dual points, on which alone the scheme is exact on the cylinder. Both are "
+        "that it compared the stencil of Figure 4.1, on the vertices of a mesh; but its Figures 4.2 to 4.4 "
+        "are those of primal and dual points, on which alone the scheme is exact on the cylinder. Both are "
         "measured.",
         "",
         f"Figures: {figures}.",
