@@ -65,6 +65,14 @@ def one_rings(mesh: Mesh, boundary: str = "extrapolate") -> Stencils:
 
     The extrapolation trusts the strips to be smooth: an error of one position reaches a ghost up to 10
     times as large, that across a corner up to 100 times. :func:`roughness` tells what to expect of it.
+
+    Examples
+    --------
+    >>> import quadcurv as qc
+    >>> ball, _, _ = qc.surfaces.cubed_sphere().sample((4, 4), "faces")
+    >>> stencils = qc.one_rings(ball)
+    >>> stencils.n, bool(stencils.closed.all())
+    (98, True)
     """
     checked_boundary(boundary)
     if boundary == "nan":
@@ -99,6 +107,14 @@ def boundary_treatment(mesh: Mesh, boundary: str = "extrapolate") -> NDArray[np.
     ------
     ValueError
         As for :func:`one_rings`.
+
+    Examples
+    --------
+    >>> import quadcurv as qc
+    >>> sheet, _, _ = qc.surfaces.tanh_sheet().sample((8, 8))
+    >>> qc.boundary_treatment(sheet)[:2, :3]
+    array([[2, 2, 2],
+           [2, 1, 1]], dtype=uint8)
     """
     given, treated = mesh.stencils().closed, one_rings(mesh, boundary)
     treatment = np.where(given, INTERIOR, np.where(treated.closed, EXTRAPOLATED, OPEN))

@@ -40,7 +40,15 @@ _STENCIL = 6  # points that a ghost is extrapolated from
 
 
 class FrenetFrame(NamedTuple):
-    """Unit tangent, normal and binormal at every point of a curve."""
+    """Unit tangent, normal and binormal at every point of a curve.
+
+    Examples
+    --------
+    >>> import numpy as np, quadcurv as qc
+    >>> line = qc.curves.line().mapping(np.linspace(0, 1, 8))
+    >>> qc.curves.frenet_frame(line).tangent[0].round(12)
+    array([0.8, 0.6])
+    """
 
     tangent: Array
     normal: Array
@@ -74,6 +82,14 @@ def curvature(points: ArrayLike, closed: bool = False, dual: ArrayLike | None = 
     varies smoothly, of first order, (h_{j+1} - h_j) kappa'/3, where it jumps from edge to edge: 256
     points of ``ellipse(5, 2)`` give 8e-4 of kappa on even steps of the parameter and 2e-2 on steps
     that vary by up to half. Rounding of the coordinates X adds eps |X| / h^2.
+
+    Examples
+    --------
+    >>> import numpy as np, quadcurv as qc
+    >>> t = np.linspace(0, 2 * np.pi, 60, endpoint=False)
+    >>> circle = np.column_stack([2 * np.cos(t), 2 * np.sin(t)])
+    >>> qc.curves.curvature(circle, closed=True).round(12)[:3]
+    array([0.5, 0.5, 0.5])
     """
     return _norm(curvature_normal(points, closed, dual))
 
@@ -106,6 +122,14 @@ def curvature_normal(points: ArrayLike, closed: bool = False, dual: ArrayLike | 
     See Also
     --------
     staggered : points and dual points from a mapping.
+
+    Examples
+    --------
+    >>> import numpy as np, quadcurv as qc
+    >>> t = np.linspace(0, 2 * np.pi, 60, endpoint=False)
+    >>> circle = np.column_stack([2 * np.cos(t), 2 * np.sin(t)])
+    >>> qc.curves.curvature_normal(circle, closed=True).round(12)[0] + 0.0
+    array([-0.5,  0. ])
     """
     position, _ = _positions("points", points, closed)
     tangent, length, _ = _edges(position, closed)
@@ -145,6 +169,14 @@ def frenet_frame(points: ArrayLike, closed: bool = False) -> FrenetFrame:
     ------
     ValueError
         As `curvature_normal`.
+
+    Examples
+    --------
+    >>> import numpy as np, quadcurv as qc
+    >>> helix = qc.curves.helix()
+    >>> frame = qc.curves.frenet_frame(helix.mapping(np.linspace(0, 4 * np.pi, 200)))
+    >>> bool(np.abs(np.einsum("ij,ij->i", frame.tangent, frame.normal)).max() < 1e-12)
+    True
     """
     position, eps = _positions("points", points, closed)
     edge, _, rounding = _edges(position, closed, eps)
@@ -189,6 +221,14 @@ def torsion(points: ArrayLike, closed: bool = False) -> Array:
     on even steps, less than half the error where steps vary slowly (1.9e-5 against 4.4e-5 on the twisted
     cubic), and does not converge where they jump: 0.2 off. The triple product t.(n_j x n_{j+1})/s has
     four times the error on even steps.
+
+    Examples
+    --------
+    >>> import numpy as np, quadcurv as qc
+    >>> helix = qc.curves.helix(radius=1.0, rise=0.5)
+    >>> tau = qc.curves.torsion(helix.mapping(np.linspace(0, 4 * np.pi, 400)))
+    >>> round(float(tau[200]), 3)
+    0.4
     """
     position, eps = _positions("points", points, closed)
     tangent, length, rounding = _edges(position, closed, eps)
@@ -232,6 +272,15 @@ def staggered(mapping: Function, parameters: ArrayLike, period: float | None = N
     (2.48) needs. The thesis puts primal points halfway between dual ones instead: the same on even
     spacing, but elsewhere exact only where cell widths grow linearly, and not consistent where they
     jump.
+
+    Examples
+    --------
+    >>> import numpy as np, quadcurv as qc
+    >>> ellipse = qc.curves.ellipse()
+    >>> t = np.linspace(-np.pi, np.pi, 64, endpoint=False)
+    >>> points, dual = qc.curves.staggered(ellipse.mapping, t, period=2 * np.pi)
+    >>> qc.curves.curvature(points, closed=True, dual=dual).shape
+    (64,)
     """
     t = np.asarray(parameters, dtype=float)
     if t.ndim != 1 or not np.isfinite(t).all() or not (np.diff(t) > 0).all():
@@ -351,6 +400,13 @@ class Curve:
         Whether the two ends of the domain are one point.
     reference : str
         Where the formulas are found.
+
+    Examples
+    --------
+    >>> import numpy as np, quadcurv as qc
+    >>> circle = qc.curves.circle(radius=4.0)
+    >>> float(circle.curvature(np.array([0.0]))[0]), circle.closed
+    (0.25, True)
     """
 
     mapping: Function
@@ -362,7 +418,14 @@ class Curve:
 
 
 def line(origin: Sequence[float] = (0.0, 0.0), direction: Sequence[float] = (0.8, 0.6)) -> Curve:
-    """Straight line origin + t direction for t in [0, 1]: kappa = 0, torsion not defined (2.33)."""
+    """Straight line origin + t direction for t in [0, 1]: kappa = 0, torsion not defined (2.33).
+
+    Examples
+    --------
+    >>> import numpy as np, quadcurv as qc
+    >>> float(qc.curves.line().curvature(np.array([0.5]))[0])
+    0.0
+    """
     start, slope = np.array(origin, dtype=float), np.array(direction, dtype=float)
     return Curve(
         mapping=lambda t: start + np.multiply.outer(t, slope),
@@ -375,7 +438,14 @@ def line(origin: Sequence[float] = (0.0, 0.0), direction: Sequence[float] = (0.8
 
 
 def circle(radius: float = 1.0) -> Curve:
-    """Circle about the origin, counter-clockwise: kappa = 1 / radius (2.38)."""
+    """Circle about the origin, counter-clockwise: kappa = 1 / radius (2.38).
+
+    Examples
+    --------
+    >>> import numpy as np, quadcurv as qc
+    >>> float(qc.curves.circle(2.0).curvature(np.array([0.5]))[0])
+    0.5
+    """
     return Curve(
         mapping=lambda t: radius * np.column_stack([np.cos(t), np.sin(t)]),
         curvature=lambda t: np.full_like(t, 1 / radius),
@@ -387,7 +457,14 @@ def circle(radius: float = 1.0) -> Curve:
 
 
 def ellipse(a: float = 5.0, b: float = 2.0) -> Curve:
-    """Ellipse with half-axes a along x and b along y, counter-clockwise (2.50, 2.51)."""
+    """Ellipse with half-axes a along x and b along y, counter-clockwise (2.50, 2.51).
+
+    Examples
+    --------
+    >>> import numpy as np, quadcurv as qc
+    >>> float(qc.curves.ellipse(5.0, 2.0).curvature(np.array([0.0]))[0])
+    1.25
+    """
     return Curve(
         mapping=lambda t: np.column_stack([a * np.cos(t), b * np.sin(t)]),
         curvature=lambda t: a * b / np.hypot(b * np.cos(t), a * np.sin(t)) ** 3,
@@ -399,7 +476,14 @@ def ellipse(a: float = 5.0, b: float = 2.0) -> Curve:
 
 
 def euler_spiral() -> Curve:
-    """Euler spiral (C(t), S(t)) of arc length t for t in [-30, 30]: kappa = 2 |t| (2.52)."""
+    """Euler spiral (C(t), S(t)) of arc length t for t in [-30, 30]: kappa = 2 |t| (2.52).
+
+    Examples
+    --------
+    >>> import numpy as np, quadcurv as qc
+    >>> float(qc.curves.euler_spiral().curvature(np.array([3.0]))[0])
+    6.0
+    """
     from scipy.special import fresnel
 
     unit = np.sqrt(np.pi / 2)  # scipy integrates sin(pi u^2 / 2), the thesis sin(u^2)
@@ -418,6 +502,12 @@ def helix(radius: float = 1.0, rise: float = 0.5) -> Curve:
     """Helix (radius cos t, radius sin t, rise t) for t in [0, 4 pi]; right-handed for rise > 0.
 
     kappa = radius / (radius^2 + rise^2), tau = rise / (radius^2 + rise^2).
+
+    Examples
+    --------
+    >>> import numpy as np, quadcurv as qc
+    >>> float(qc.curves.helix(1.0, 0.5).torsion(np.array([0.0]))[0])
+    0.4
     """
     square = radius**2 + rise**2
     return Curve(

@@ -38,6 +38,15 @@ def disagreement(
     ------
     ValueError
         As for :func:`quadcurv.mean_curvature`; the reference is the scheme itself.
+
+    Examples
+    --------
+    >>> import numpy as np, quadcurv as qc
+    >>> from quadcurv.estimate import disagreement
+    >>> ball, _, _ = qc.surfaces.cubed_sphere().sample((12, 12), "faces")
+    >>> error = qc.mean_curvature(ball, "liu") - 1
+    >>> bool(np.abs(disagreement(ball, "liu") - error).max() < 0.2 * np.abs(error).max())
+    True
     """
     scheme, reference = as_scheme(scheme), as_scheme(reference)
     if scheme.name == reference.name:
@@ -83,6 +92,16 @@ def richardson(
     ----------
     L. F. Richardson (1911), The approximate arithmetical solution by finite differences of physical
     problems, Philosophical Transactions of the Royal Society A 210, 307-357.
+
+    Examples
+    --------
+    >>> import numpy as np, quadcurv as qc
+    >>> from quadcurv.estimate import richardson
+    >>> torus = qc.surfaces.torus()
+    >>> grid, xi, eta = torus.sample((32, 32))
+    >>> error = qc.mean_curvature(grid, "liu") - torus.mean_curvature(xi, eta)
+    >>> bool(np.abs(richardson(grid, "liu") - error).max() < 0.2 * np.abs(error).max())
+    True
     """
     scheme = as_scheme(scheme)
     if not isinstance(grid, QuadGrid):

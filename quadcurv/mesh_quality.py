@@ -48,6 +48,14 @@ def quality(mesh: Any) -> dict[str, NDArray[Any]]:
     ------
     ValueError
         As for :func:`quadcurv.mean_curvature`.
+
+    Examples
+    --------
+    >>> import quadcurv as qc
+    >>> ball, _, _ = qc.surfaces.cubed_sphere().sample((4, 4), "faces")
+    >>> found = qc.quality(ball)
+    >>> int(found["valence"].min()), float(found["nonplanarity"].max()) < 0.1
+    (3, True)
     """
     mesh = as_mesh(mesh)
     stencils = mesh.stencils()
@@ -87,6 +95,14 @@ def summary(mesh: Any, schemes: Iterable[str] | None = None, boundary: str = "ex
     ------
     ValueError
         As for :func:`quadcurv.mean_curvature`.
+
+    Examples
+    --------
+    >>> import quadcurv as qc
+    >>> ball, _, _ = qc.surfaces.cubed_sphere().sample((4, 4), "faces")
+    >>> found = qc.summary(ball, ["liu"])
+    >>> found["quads"], found["valence"], found["undefined"]
+    (96, {3: 8, 4: 90}, {'liu': 0})
     """
     mesh = as_mesh(mesh)
     stencils = mesh.stencils()

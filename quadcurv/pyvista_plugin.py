@@ -36,6 +36,13 @@ class Accessor:
     ----------
     dataset : pyvista.PolyData or pyvista.StructuredGrid
         A StructuredGrid of one layer.
+
+    Examples
+    --------
+    >>> import quadcurv as qc
+    >>> grid = qc.to_pyvista(qc.surfaces.tanh_sheet().sample((16, 16))[0])
+    >>> grid.quadcurv.mean_curvature().shape
+    (289,)
     """
 
     def __init__(self, dataset: pv.PolyData | pv.StructuredGrid) -> None:

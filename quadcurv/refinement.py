@@ -104,6 +104,12 @@ class Convergence:
         ``errors[scheme][norm]``, one number a shape; norms as in :func:`norms`.
     undefined : dict of str to int array
         Number of vertices without a result, one number a shape; they are left out of the norms.
+
+    Examples
+    --------
+    >>> import quadcurv as qc
+    >>> qc.convergence("torus", "liu", [8, 16])
+    Convergence(H on torus, staggered, 8x8, 16x16, by liu)
     """
 
     surface: str

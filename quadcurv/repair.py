@@ -41,6 +41,14 @@ def pair_triangles(mesh: Any) -> QuadMesh:
     The fractional matching of maximum weight is half a matching of the bipartite double cover, which has
     every triangle on both sides; where it leaves an odd cycle the best pairs are taken first. About a
     second per 50,000 triangles.
+
+    Examples
+    --------
+    >>> import quadcurv as qc
+    >>> ball, _, _ = qc.surfaces.cubed_sphere().sample((4, 4), "faces")
+    >>> halves = [*ball.faces[:, [0, 1, 2]], *ball.faces[:, [2, 3, 0]]]
+    >>> qc.pair_triangles((ball.points, halves))
+    QuadMesh(98 points, 96 quads)
     """
     mesh = face_list(mesh)
     m = len(mesh.faces)
@@ -109,6 +117,13 @@ def duplicate_points(mesh: Any, tolerance: float = 0.0) -> NDArray[np.int64]:
     ------
     MeshError
         A ValueError: tolerance is negative or not a number.
+
+    Examples
+    --------
+    >>> import quadcurv as qc
+    >>> points = [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [1, 0, 0], [2, 0, 0], [2, 1, 0], [1, 1, 0]]
+    >>> qc.duplicate_points((points, [[0, 1, 2, 3], [4, 5, 6, 7]])).tolist()
+    [0, 1, 2, 3, 1, 5, 6, 2]
     """
     if not (isinstance(tolerance, int | float | np.number) and tolerance >= 0):
         raise MeshError(f"tolerance: expected a length >= 0, got {tolerance!r}")
@@ -144,6 +159,14 @@ def merge_points(mesh: Any, tolerance: float = 0.0) -> tuple[QuadMesh, NDArray[n
     -----
     MeshWarning
         Faces now meet where more than two share an edge, or are the same one.
+
+    Examples
+    --------
+    >>> import quadcurv as qc
+    >>> points = [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [1, 0, 0], [2, 0, 0], [2, 1, 0], [1, 1, 0]]
+    >>> merged, vertex = qc.merge_points((points, [[0, 1, 2, 3], [4, 5, 6, 7]]))
+    >>> merged, vertex.tolist()
+    (QuadMesh(6 points, 2 quads), [0, 1, 2, 3, 1, 4, 5, 2])
     """
     mesh = face_list(mesh, seams=False)
     kept, vertex = np.unique(duplicate_points(mesh, tolerance), return_inverse=True)
@@ -181,6 +204,14 @@ def as_grid(mesh: Any) -> tuple[QuadGrid, NDArray[np.int64]]:
     MeshError
         A ValueError: triangles, another valence (with the first vertex), several components,
         a non-orientable mesh, a torus whose lines close with a shift, or fewer than three vertices around.
+
+    Examples
+    --------
+    >>> import quadcurv as qc
+    >>> torus = qc.surfaces.torus().sample((12, 8))[0].to_mesh()
+    >>> grid, vertex = qc.as_grid(torus)
+    >>> sorted(grid.shape), grid.wrap
+    ([8, 12], (True, True))
     """
     mesh = face_list(mesh)
     faces = mesh.faces
@@ -258,6 +289,13 @@ def flip(mesh: Any) -> Mesh:
     QuadMesh, QuadGrid or StaggeredGrid
         Of a face list the same vertices, every face beginning with the same one. Of a grid its transpose:
         rows become columns, and values (r, c) become ``values.T``.
+
+    Examples
+    --------
+    >>> import quadcurv as qc
+    >>> ball, _, _ = qc.surfaces.cubed_sphere().sample((4, 4), "faces")
+    >>> bool((qc.mean_curvature(qc.flip(ball)) < 0).all())
+    True
     """
     mesh = as_mesh(mesh)
     if isinstance(mesh, QuadGrid):
@@ -290,6 +328,14 @@ def orient(mesh: Any) -> Mesh:
         as the wall of a cavity, too. Open parts have no outside and are left as they are, as are parts
         without volume and non-orientable meshes. Where nothing is turned the mesh itself is returned, a
         grid that is turned is transposed as in :func:`flip`.
+
+    Examples
+    --------
+    >>> import quadcurv as qc
+    >>> ball, _, _ = qc.surfaces.cubed_sphere().sample((4, 4), "faces")
+    >>> inside_out = qc.flip(ball)
+    >>> bool((qc.mean_curvature(qc.orient(inside_out)) > 0).all())
+    True
     """
     mesh = as_mesh(mesh)
     if isinstance(mesh, QuadMesh):

@@ -12,12 +12,46 @@ Bools = NDArray[np.bool_]
 
 
 class MeshError(ValueError):
-    """What is wrong with a mesh: which argument, where first (face or vertex), and how often."""
+    """What is wrong with a mesh: which argument, where first (face or vertex), and how often.
+
+    Examples
+    --------
+    >>> import quadcurv as qc
+    >>> qc.as_mesh(([[0, 0, 0], [1, 0, 0], [1, 1, 0]], [[0, 1, 7]]))  # doctest: +IGNORE_EXCEPTION_DETAIL
+    Traceback (most recent call last):
+        ...
+    quadcurv.types.MeshError: faces: indices out of range
+    """
 
 
 class MeshWarning(UserWarning):
-    """What was mended in a mesh, or which part of it has no answer: what, where first, how often."""
+    """What was mended in a mesh, or which part of it has no answer: what, where first, how often.
+
+    Examples
+    --------
+    >>> import warnings
+    >>> import quadcurv as qc
+    >>> ball, _, _ = qc.surfaces.cubed_sphere().sample((4, 4), "faces")
+    >>> with warnings.catch_warnings(record=True) as said:
+    ...     warnings.simplefilter("always")
+    ...     mesh = qc.as_mesh((ball.points, [*ball.faces, ball.faces[7]]))
+    >>> print(said[0].message)
+    1 face(s) given twice, taken once, first face 96
+    """
 
 
 class PrecisionWarning(MeshWarning):
-    """Positions are rounded so coarsely that it shows in the curvature."""
+    """Positions are rounded so coarsely that it shows in the curvature.
+
+    Examples
+    --------
+    >>> import warnings
+    >>> import numpy as np, quadcurv as qc
+    >>> ball, _, _ = qc.surfaces.sphere().sample((300, 300))
+    >>> far = (ball.points + 100).astype(np.float32)
+    >>> with warnings.catch_warnings(record=True) as said:
+    ...     warnings.simplefilter("always")
+    ...     H = qc.mean_curvature(qc.QuadGrid(far, ball.wrap), "liu")
+    >>> said[0].category.__name__
+    'PrecisionWarning'
+    """

@@ -85,6 +85,12 @@ def as_mesh(mesh: Any, quads: ArrayLike | None = None, wrap: Wrap | None = None)
       is still there and these are its triangles; looked for where the order does not tell all;
     - "block", "interleaved", "diagonal": by the order of the triangles, or by their closing edges;
     - "none": they are triangles. :func:`quadcurv.pair_triangles` pairs them by their shape.
+
+    Examples
+    --------
+    >>> import quadcurv as qc
+    >>> qc.as_mesh(([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], [[0, 1, 2, 3]]))
+    QuadMesh(4 points, 1 quads)
     """
     return opened(mesh, quads, wrap)
 
@@ -205,6 +211,16 @@ def read(
     -----
     VTK's files, Exodus, glTF and those of meshlane are read in a process of its own, which may take 20 times
     the memory of the file and 200 MB, and 8 seconds of the processor and one more for every 5 MB.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> import quadcurv as qc
+    >>> ball, _, _ = qc.surfaces.cubed_sphere().sample((4, 4), "faces")
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     qc.write(f"{folder}/ball.ply", ball)
+    ...     qc.read(f"{folder}/ball.ply")
+    QuadMesh(98 points, 96 quads)
     """
     if not isinstance(path, str | os.PathLike):
         raise TypeError(f"path: expected the name of a file, got {type(path).__name__}")
@@ -237,6 +253,16 @@ def read_values(path: str | os.PathLike[str]) -> dict[str, NDArray[Any]]:
     ------
     MeshError, OSError
         As :func:`read`.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> import quadcurv as qc
+    >>> ball, _, _ = qc.surfaces.cubed_sphere().sample((4, 4), "faces")
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     qc.write(f"{folder}/ball.ply", ball, {"H": qc.mean_curvature(ball)})
+    ...     {name: values.shape for name, values in qc.read_values(f"{folder}/ball.ply").items()}
+    {'H': (98,)}
     """
     try:
         return dict(_content(path).values)
@@ -311,6 +337,17 @@ def write(path: str | os.PathLike[str], mesh: Any, point_data: Mapping[str, Arra
         A ValueError: values of another shape, or that the format cannot hold; an unknown suffix.
     OSError
         It cannot be written.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> import quadcurv as qc
+    >>> ball, _, _ = qc.surfaces.cubed_sphere().sample((4, 4), "faces")
+    >>> H = qc.mean_curvature(ball)
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     qc.write(f"{folder}/ball.vtp", ball, {"H": H})
+    ...     bool((qc.read_values(f"{folder}/ball.vtp")["H"] == H).all())
+    True
     """
     path = Path(path)
     mesh = as_mesh(mesh)

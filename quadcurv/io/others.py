@@ -26,6 +26,13 @@ def to_trimesh(mesh: Any) -> Any:
     trimesh.Trimesh
         Not processed: no vertex merged or dropped. Quads (a, b, c, d) as (a, b, c) and (c, d, a), as trimesh
         cuts them; the face attribute "quadcurv" tells :func:`as_mesh` which belong together.
+
+    Examples
+    --------
+    >>> import quadcurv as qc
+    >>> ball, _, _ = qc.surfaces.cubed_sphere().sample((4, 4), "faces")
+    >>> len(qc.to_trimesh(ball).faces)
+    192
     """
     return trimesh.from_mesh(face_list(mesh))
 
@@ -42,6 +49,15 @@ def to_pyvista(mesh: Any) -> Any:
     -------
     pyvista.PolyData or pyvista.StructuredGrid
         In double precision. Where a grid wraps the last row or column repeats the first.
+
+    Examples
+    --------
+    >>> import quadcurv as qc
+    >>> ball, _, _ = qc.surfaces.cubed_sphere().sample((4, 4), "faces")
+    >>> surface = qc.to_pyvista(ball)
+    >>> surface["H"] = qc.mean_curvature(ball)
+    >>> surface.n_points, surface.n_cells
+    (98, 96)
     """
     mesh = as_mesh(mesh)
     if isinstance(mesh, QuadGrid):
@@ -66,6 +82,14 @@ def to_pymeshlab(mesh: Any) -> Any:
     ------
     ImportError
         pymeshlab, the extra "meshlab", or a system library that it needs is not installed.
+
+    Examples
+    --------
+    >>> import quadcurv as qc
+    >>> ball, _, _ = qc.surfaces.cubed_sphere().sample((4, 4), "faces")
+    >>> meshes = qc.to_pymeshlab(ball)  # doctest: +SKIP
+    >>> meshes.current_mesh().vertex_number()  # doctest: +SKIP
+    98
     """
     return pymeshlab.from_mesh(face_list(mesh))
 
@@ -96,6 +120,15 @@ def attach(mesh: Any, name: str, values: ArrayLike, colormap: str | None = "viri
         A ValueError: another number of values, or MeshLab refuses the name.
     TypeError
         None of these types.
+
+    Examples
+    --------
+    >>> import quadcurv as qc
+    >>> ball, _, _ = qc.surfaces.cubed_sphere().sample((4, 4), "faces")
+    >>> triangles = qc.to_trimesh(ball)
+    >>> qc.attach(triangles, "H", qc.mean_curvature(triangles))
+    >>> triangles.vertex_attributes["H"].shape
+    (98,)
     """
     entry = library(mesh)
     if entry is None or entry.attach is None:

@@ -45,6 +45,12 @@ def set_threads(number: int | None) -> None:
     ------
     ValueError
         No whole number, less than 1, more than 1024.
+
+    Examples
+    --------
+    >>> import quadcurv as qc
+    >>> qc.set_threads(1)
+    >>> qc.set_threads(None)
     """
     global _threads
     if number is not None and (isinstance(number, bool) or not hasattr(number, "__index__")):

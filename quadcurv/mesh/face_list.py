@@ -73,6 +73,13 @@ class QuadMesh:
     -----
     Vertices without a face, vertices where several fans touch and the ends of edges of more than two faces
     are accepted: their curvature is NaN. `report` counts all of these.
+
+    Examples
+    --------
+    >>> import quadcurv as qc
+    >>> points = [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [2, 0, 0]]
+    >>> qc.QuadMesh(points, [[0, 1, 2, 3], [1, 4, 2]])
+    QuadMesh(5 points, 1 quads, 1 triangles)
     """
 
     points: Floats

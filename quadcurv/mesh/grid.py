@@ -51,6 +51,16 @@ class QuadGrid:
     -----
     MeshWarning
         Points that are NaN without being masked.
+
+    Examples
+    --------
+    >>> import numpy as np, quadcurv as qc
+    >>> x, y = np.meshgrid(np.linspace(-1, 1, 21), np.linspace(-1, 1, 21), indexing="ij")
+    >>> hill = qc.QuadGrid(np.stack([x, y, np.exp(-(x**2) - y**2)], axis=-1))
+    >>> hill
+    QuadGrid(21 x 21 points, wrap=(False, False))
+    >>> round(float(qc.mean_curvature(hill)[10, 10]), 2)
+    2.0
     """
 
     points: Floats

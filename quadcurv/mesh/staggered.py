@@ -37,6 +37,15 @@ class StaggeredGrid:
     ------
     MeshError
         A ValueError: wrong shapes, non-finite points, or a seam that does not meet.
+
+    Examples
+    --------
+    >>> import quadcurv as qc
+    >>> cells, _, _ = qc.surfaces.cylinder().sample((16, 8), "staggered")
+    >>> cells
+    StaggeredGrid(16 x 8 cells, wrap=(False, False))
+    >>> qc.mean_curvature(cells, "finite_volume").round(12).max().item()
+    0.5
     """
 
     primal: Floats

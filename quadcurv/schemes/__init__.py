@@ -77,6 +77,12 @@ def as_scheme(scheme: str | Scheme) -> Scheme:
     ------
     ValueError
         The name is not in ``SCHEMES``.
+
+    Examples
+    --------
+    >>> from quadcurv import schemes
+    >>> schemes.as_scheme("liu").order
+    2
     """
     if isinstance(scheme, Scheme):
         return scheme

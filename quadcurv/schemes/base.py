@@ -22,6 +22,12 @@ class Diamond:
     area : {"ring", "quads"}
         Dual area: half the vector area of the ring polygon (finite volumes), or a quarter of each quad
         around (Liu's formula).
+
+    Examples
+    --------
+    >>> import quadcurv as qc
+    >>> qc.SCHEMES["liu"].fast
+    Diamond(area='quads')
     """
 
     area: Literal["ring", "quads"]
@@ -50,6 +56,14 @@ class Laplacian:
         What a compiled driver needs to know of the scheme.
     symmetric : bool
         Whether S is symmetric on every mesh of quads.
+
+    Examples
+    --------
+    >>> import quadcurv as qc
+    >>> ball, _, _ = qc.surfaces.cubed_sphere().sample((4, 4), "faces")
+    >>> S, A = qc.SCHEMES["liu"].assemble(ball.stencils())
+    >>> S.shape, A.shape
+    ((98, 98), (98,))
     """
 
     name: str
@@ -62,7 +76,15 @@ class Laplacian:
 
 
 class StandardErrors(NamedTuple):
-    """One standard deviation of H, K, k1 and k2, of the shape of these."""
+    """One standard deviation of H, K, k1 and k2, of the shape of these.
+
+    Examples
+    --------
+    >>> import quadcurv as qc
+    >>> ball, _, _ = qc.surfaces.cubed_sphere().sample((4, 4), "faces")
+    >>> qc.curvatures(ball).standard_error.mean.shape
+    (98,)
+    """
 
     mean: Floats
     gaussian: Floats
@@ -92,6 +114,13 @@ class Curvatures:
         Standard deviation of the positions along the normal, from the residuals, in length.
     degree, rings : int32 or None
         Degree and neighbourhood of the fit at each vertex, 0 where there is none.
+
+    Examples
+    --------
+    >>> import quadcurv as qc
+    >>> found = qc.curvatures(qc.surfaces.torus().sample((32, 24))[0])
+    >>> bool((found.k1 >= found.k2).all()), found.direction1.shape
+    (True, (32, 24, 3))
     """
 
     mean: Floats
@@ -185,6 +214,12 @@ class Fit:
         Neighbourhoods -> Curvatures at all n vertices, arrays (n,) and (n, 3). A driver gives them the mesh's
         shape, puts NaN at vertices that want none, and takes the side with H >= 0 where no side is the
         outer one.
+
+    Examples
+    --------
+    >>> import quadcurv as qc
+    >>> qc.SCHEMES["jet"].order
+    4
     """
 
     name: str

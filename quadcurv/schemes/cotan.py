@@ -43,6 +43,12 @@ def cotan(valence: int = 6, area: str = "barycentric", diagonal: int = 0) -> Lap
     -----
     With valence 6 the result depends on the vertex that each face begins with: turn a face over as
     ``face[[0, 3, 2, 1]]`` to keep its diagonal.
+
+    Examples
+    --------
+    >>> from quadcurv import schemes
+    >>> schemes.cotan(6, "voronoi").name
+    'cotan-6-voronoi'
     """
     for name, value, allowed in (
         ("valence", valence, VALENCES),

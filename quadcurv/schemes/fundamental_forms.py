@@ -44,6 +44,15 @@ def fundamental_forms(order: int = 2) -> Fit:
     References
     ----------
     M. P. do Carmo (1976), Differential Geometry of Curves and Surfaces, sections 2-5 and 3-3.
+
+    Examples
+    --------
+    >>> import numpy as np, quadcurv as qc
+    >>> torus = qc.surfaces.torus()
+    >>> grid, xi, eta = torus.sample((48, 32))
+    >>> H = qc.mean_curvature(grid, qc.schemes.fundamental_forms(4))
+    >>> bool(np.abs(H - torus.mean_curvature(xi, eta)).max() < 1e-3)
+    True
     """
     if order not in _WEIGHTS:
         raise ValueError(f"order: expected one of {tuple(_WEIGHTS)}, got {order!r}")

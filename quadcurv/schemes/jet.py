@@ -61,6 +61,13 @@ def jet(degree: int | Literal["auto"] = 4, rings: int | None = None) -> Fit:
     ----------
     F. Cazals, M. Pouget (2005), Estimating differential quantities using polynomial fitting of
     osculating jets, Computer Aided Geometric Design 22, 121-146.
+
+    Examples
+    --------
+    >>> import quadcurv as qc
+    >>> cubic = qc.schemes.jet(3)
+    >>> cubic.name
+    'jet-3'
     """
     if degree == "auto":
         if rings is not None:

@@ -33,6 +33,12 @@ def bunge() -> Laplacian:
     ----------
     A. Bunge, P. Herholz, M. Kazhdan, M. Botsch (2020), Polygon Laplacian made simple, Computer Graphics
     Forum 39, 303-313.
+
+    Examples
+    --------
+    >>> from quadcurv import schemes
+    >>> schemes.bunge().name
+    'bunge'
     """
 
     def local(x: Floats) -> tuple[Floats, Floats]:
@@ -84,6 +90,12 @@ def de_goes(stabilisation: float = 1.0) -> Laplacian:
     ----------
     F. de Goes, A. Butts, M. Desbrun (2020), Discrete differential operators on polygonal meshes, ACM
     Transactions on Graphics 39, 110.
+
+    Examples
+    --------
+    >>> from quadcurv import schemes
+    >>> schemes.de_goes().name
+    'de_goes'
     """
     _checked(stabilisation)
 
@@ -120,6 +132,12 @@ def alexa_wardetzky(stabilisation: float = 1.0) -> Laplacian:
     ----------
     M. Alexa, M. Wardetzky (2011), Discrete Laplacians on general polygonal meshes, ACM Transactions on
     Graphics 30, 102.
+
+    Examples
+    --------
+    >>> from quadcurv import schemes
+    >>> schemes.alexa_wardetzky().name
+    'alexa_wardetzky'
     """
     _checked(stabilisation)
 

@@ -79,6 +79,12 @@ def as_surface(surface: str | Surface) -> Surface:
         An unknown name; the message lists what there is.
     TypeError
         Neither a name nor a `Surface`.
+
+    Examples
+    --------
+    >>> import quadcurv as qc
+    >>> qc.surfaces.as_surface("torus").name
+    'torus'
     """
     if isinstance(surface, Surface):
         return surface

@@ -61,6 +61,13 @@ class Surface:
     singular_points : tuple of (float, float), default ()
         Parameters (xi, eta) of the domain where X_xi x X_eta vanishes. The curvature returned there
         is the limit, infinities included.
+
+    Examples
+    --------
+    >>> import quadcurv as qc
+    >>> ball = qc.surfaces.sphere(radius=2.0)
+    >>> float(ball.mean_curvature(0.3, 0.2)), ball.mapping(0.3, 0.2).shape
+    (0.5, (3,))
     """
 
     name: str

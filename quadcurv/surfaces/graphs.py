@@ -22,6 +22,13 @@ def plane() -> Surface:
     References
     ----------
     Hutchins (2013), section 3.3.2.
+
+    Examples
+    --------
+    >>> import quadcurv as qc
+    >>> surface = qc.surfaces.plane()
+    >>> round(float(surface.mean_curvature(0.3, 0.2)), 6), round(float(surface.gaussian_curvature(0.3, 0.2)), 6)
+    (0.0, 0.0)
     """
     return closed_form(
         "plane",
@@ -82,6 +89,13 @@ def elliptic_paraboloid(a: float = 1.0, b: float = 1.0) -> Surface:
     References
     ----------
     do Carmo (1976), section 3-3, example 5.
+
+    Examples
+    --------
+    >>> import quadcurv as qc
+    >>> surface = qc.surfaces.elliptic_paraboloid()
+    >>> round(float(surface.mean_curvature(0.5, 0.25)), 6), round(float(surface.gaussian_curvature(0.5, 0.25)), 6)
+    (-0.962963, 0.790123)
     """
     require_positive(a=a, b=b)
 
@@ -116,6 +130,13 @@ def hyperbolic_paraboloid(a: float = 1.0, b: float = 1.0) -> Surface:
     References
     ----------
     do Carmo (1976), section 3-3, example 5.
+
+    Examples
+    --------
+    >>> import quadcurv as qc
+    >>> surface = qc.surfaces.hyperbolic_paraboloid()
+    >>> round(float(surface.mean_curvature(0.5, 0.25)), 6), round(float(surface.gaussian_curvature(0.5, 0.25)), 6)
+    (0.222222, -0.790123)
     """
     require_positive(a=a, b=b)
 
@@ -151,6 +172,13 @@ def tanh_sheet(height: float = 1.0) -> Surface:
     References
     ----------
     do Carmo (1976), section 3-3, example 5.
+
+    Examples
+    --------
+    >>> import quadcurv as qc
+    >>> surface = qc.surfaces.tanh_sheet()
+    >>> round(float(surface.mean_curvature(0.5, 0.25)), 6), round(float(surface.gaussian_curvature(0.5, 0.25)), 6)
+    (0.204842, -0.338511)
     """
     require_positive(height=height)
 

@@ -30,6 +30,13 @@ def catenoid(waist: float = 1.0) -> Surface:
     References
     ----------
     Hutchins (2013), eq. 3.79, which prints Z = eta where Z = xi is meant.
+
+    Examples
+    --------
+    >>> import quadcurv as qc
+    >>> surface = qc.surfaces.catenoid()
+    >>> round(float(surface.mean_curvature(0.0, 0.2)), 6), round(float(surface.gaussian_curvature(0.0, 0.2)), 6)
+    (0.0, -1.0)
     """
     require_positive(waist=waist)
     return closed_form(
@@ -69,6 +76,13 @@ def helicoid(pitch: float = 2 * np.pi) -> Surface:
     References
     ----------
     Hutchins (2013), eq. 3.80.
+
+    Examples
+    --------
+    >>> import quadcurv as qc
+    >>> surface = qc.surfaces.helicoid()
+    >>> round(float(surface.mean_curvature(0.5, 0.25)), 6), round(float(surface.gaussian_curvature(0.5, 0.25)), 6)
+    (0.0, -0.64)
     """
     require_positive(pitch=pitch)
     c = pitch / (2 * np.pi)
@@ -97,6 +111,13 @@ def enneper() -> Surface:
     References
     ----------
     do Carmo (1976), section 3-5.
+
+    Examples
+    --------
+    >>> import quadcurv as qc
+    >>> surface = qc.surfaces.enneper()
+    >>> round(float(surface.mean_curvature(0.5, 0.25)), 6), round(float(surface.gaussian_curvature(0.5, 0.25)), 6)
+    (0.0, -1.347916)
     """
     return closed_form(
         "enneper",
@@ -129,6 +150,13 @@ def henneberg() -> Surface:
     ----------
     L. Henneberg (1875), Ueber solche Minimalflaechen, welche eine vorgeschriebene ebene Curve zur
     geodaetischen Linie haben, dissertation, ETH Zuerich; Hutchins (2013), section 3.3.2.
+
+    Examples
+    --------
+    >>> import quadcurv as qc
+    >>> surface = qc.surfaces.henneberg()
+    >>> round(float(surface.mean_curvature(0.5, 0.25)), 6), round(float(surface.gaussian_curvature(0.5, 0.25)), 6)
+    (0.0, -0.023996)
     """
 
     def gaussian_curvature(xi: Floats, eta: Floats) -> Floats:

@@ -36,6 +36,13 @@ def cylinder(radius: float = 1.0, f: Callable[[Floats], Floats] | None = None) -
     References
     ----------
     Hutchins (2013), eq. 3.36 and section 4.2.
+
+    Examples
+    --------
+    >>> import quadcurv as qc
+    >>> surface = qc.surfaces.cylinder()
+    >>> round(float(surface.mean_curvature(0.3, 0.2)), 6), round(float(surface.gaussian_curvature(0.3, 0.2)), 6)
+    (0.5, 0.0)
     """
     require_positive(radius=radius)
     shift = f if f is not None else np.zeros_like
@@ -75,6 +82,13 @@ def torus(major: float = 2.0, minor: float = 1.0) -> Surface:
     References
     ----------
     do Carmo (1976), section 3-3.
+
+    Examples
+    --------
+    >>> import quadcurv as qc
+    >>> surface = qc.surfaces.torus()
+    >>> round(float(surface.mean_curvature(0.5, 0.25)), 6), round(float(surface.gaussian_curvature(0.5, 0.25)), 6)
+    (0.663176, 0.326353)
     """
     require_positive(major=major, minor=minor)
     if minor >= major:
@@ -122,6 +136,13 @@ def hyperboloid(radius: float = 1.0, height: float = 1.0) -> Surface:
     References
     ----------
     do Carmo (1976), section 3-3 (surfaces of revolution).
+
+    Examples
+    --------
+    >>> import quadcurv as qc
+    >>> surface = qc.surfaces.hyperboloid()
+    >>> round(float(surface.mean_curvature(0.5, 0.25)), 6), round(float(surface.gaussian_curvature(0.5, 0.25)), 6)
+    (0.053292, -0.786448)
     """
     require_positive(radius=radius, height=height)
 
@@ -179,6 +200,13 @@ def dupin_cyclide(major: float = 2.0, minor: float = 1.0, offset: float = 0.5) -
     ----------
     V. Chandru, D. Dutta, C. M. Hoffmann (1989), On the geometry of Dupin cyclides, The Visual Computer
     5, 277-290.
+
+    Examples
+    --------
+    >>> import quadcurv as qc
+    >>> surface = qc.surfaces.dupin_cyclide()
+    >>> round(float(surface.mean_curvature(0.5, 0.25)), 6), round(float(surface.gaussian_curvature(0.5, 0.25)), 6)
+    (0.421084, -1.674421)
     """
     require_positive(major=major, minor=minor, offset=offset)
     if not offset < minor < major:

@@ -66,6 +66,13 @@ def sphere(radius: float = 1.0, latitude: float = np.pi / 3) -> Surface:
     References
     ----------
     Hutchins (2013), section 3.3.3, figures 3.10 and 3.11.
+
+    Examples
+    --------
+    >>> import quadcurv as qc
+    >>> surface = qc.surfaces.sphere(radius=2.0)
+    >>> round(float(surface.mean_curvature(0.3, 0.2)), 6), round(float(surface.gaussian_curvature(0.3, 0.2)), 6)
+    (0.5, 0.25)
     """
     return _sphere(
         "sphere",
@@ -134,6 +141,13 @@ def pillow_sphere(radius: float = 1.0) -> Surface:
     ----------
     D. A. Calhoun, C. Helzel, R. J. LeVeque (2008), Logically rectangular grids and finite volume
     methods for PDEs in circular and spherical domains, SIAM Review 50(4), 723-752.
+
+    Examples
+    --------
+    >>> import quadcurv as qc
+    >>> surface = qc.surfaces.pillow_sphere()
+    >>> round(float(surface.mean_curvature(-2.5, 0.2)), 6), round(float(surface.gaussian_curvature(-2.5, 0.2)), 6)
+    (1.0, 1.0)
     """
     return _sphere(
         "pillow_sphere",
@@ -198,6 +212,13 @@ def cubed_sphere(radius: float = 1.0) -> Surface:
     ----------
     C. Ronchi, R. Iacono, P. S. Paolucci (1996), The "cubed sphere": a new method for the solution
     of partial differential equations in spherical geometry, J. Comput. Phys. 124, 93-114.
+
+    Examples
+    --------
+    >>> import quadcurv as qc
+    >>> surface = qc.surfaces.cubed_sphere()
+    >>> round(float(surface.mean_curvature(0.3, 0.2)), 6), round(float(surface.gaussian_curvature(0.3, 0.2)), 6)
+    (1.0, 1.0)
     """
     return _sphere(
         "cubed_sphere",
@@ -264,6 +285,13 @@ def ellipsoid(a: float = 2.0, b: float = 1.5, c: float = 1.0, latitude: float = 
     ----------
     R. Goldman (2005), Curvature formulas for implicit curves and surfaces, Computer Aided Geometric
     Design 22, 632-658.
+
+    Examples
+    --------
+    >>> import quadcurv as qc
+    >>> surface = qc.surfaces.ellipsoid()
+    >>> round(float(surface.mean_curvature(0.5, 0.25)), 6), round(float(surface.gaussian_curvature(0.5, 0.25)), 6)
+    (1.078156, 0.973362)
     """
     return _scaled("ellipsoid", sphere(latitude=latitude), _longitude_latitude, a, b, c)
 
@@ -290,5 +318,12 @@ def cubed_ellipsoid(a: float = 2.0, b: float = 1.5, c: float = 1.0) -> Surface:
     ----------
     R. Goldman (2005), Curvature formulas for implicit curves and surfaces, Computer Aided Geometric
     Design 22, 632-658.
+
+    Examples
+    --------
+    >>> import quadcurv as qc
+    >>> surface = qc.surfaces.cubed_ellipsoid()
+    >>> round(float(surface.mean_curvature(0.5, 0.25)), 6), round(float(surface.gaussian_curvature(0.5, 0.25)), 6)
+    (0.949557, 0.858125)
     """
     return _scaled("cubed_ellipsoid", cubed_sphere(), _cube, a, b, c)

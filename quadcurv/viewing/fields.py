@@ -32,6 +32,14 @@ class Fields:
     ----------
     names : list of str
         :data:`FIELDS` and, of several schemes, "difference to SCHEME" for each.
+
+    Examples
+    --------
+    >>> import quadcurv as qc
+    >>> from quadcurv.viewing import Fields
+    >>> ball, _, _ = qc.surfaces.cubed_sphere().sample((4, 4), "faces")
+    >>> Fields(qc.compare(ball, "jet")).names[:2]
+    ['mean_curvature', 'error']
     """
 
     def __init__(self, comparison: Comparison) -> None:

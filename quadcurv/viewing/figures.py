@@ -50,6 +50,14 @@ def plot(convergence: Convergence, norms: Sequence[str] = ("one", "inf")) -> Fig
     ------
     ValueError
         No or unknown norms.
+
+    Examples
+    --------
+    >>> import quadcurv as qc
+    >>> run = qc.convergence("torus", ["finite_volume", "liu"], [8, 16, 32])
+    >>> figure = qc.plot(run)
+    >>> len(figure.axes)
+    2
     """
     if not norms or isinstance(norms, str) or not set(norms) <= set(NORMS):
         raise ValueError(f"norms: expected any of {', '.join(NORMS)}, got {list(norms)}")
@@ -117,6 +125,15 @@ def convergence_plot(
     -------
     dict
         Fitted rate by label, for the labels in `fit`; NaN, and no line, where an error is zero.
+
+    Examples
+    --------
+    >>> from matplotlib.figure import Figure
+    >>> from quadcurv.viewing import convergence_plot
+    >>> axes = Figure().subplots()
+    >>> rates = convergence_plot(axes, [8, 16, 32], {"liu": [4e-2, 1e-2, 2.5e-3]}, fit={"liu": (8, 32)})
+    >>> round(rates["liu"], 6)
+    2.0
     """
     n = np.asarray(sizes, dtype=float)
     errors = {label: np.asarray(e, dtype=float) for label, e in series.items()}

@@ -19,7 +19,14 @@ _SECONDS = 120
 
 
 class NoOpenGLError(RuntimeError):
-    """No OpenGL is usable for rendering; the message says what to install."""
+    """No OpenGL is usable for rendering; the message says what to install.
+
+    Examples
+    --------
+    >>> from quadcurv.viewing import NoOpenGLError
+    >>> issubclass(NoOpenGLError, RuntimeError)
+    True
+    """
 
 
 @functools.cache
@@ -28,6 +35,12 @@ def opengl_problem() -> str | None:
 
     Probed once, in a process of its own: without a usable OpenGL library VTK ends the process. It is
     isolated: nothing in the current folder is run, whatever its name.
+
+    Examples
+    --------
+    >>> from quadcurv.viewing import opengl_problem
+    >>> if opengl_problem() is None:
+    ...     print("pictures can be made")  # doctest: +SKIP
     """
     here = os.path.realpath(os.curdir)
     folders = [folder for folder in sys.path if folder and os.path.realpath(folder) != here]
@@ -42,7 +55,14 @@ def opengl_problem() -> str | None:
 
 
 def window_problem() -> str | None:
-    """Why no window can be opened here, None if one can."""
+    """Why no window can be opened here, None if one can.
+
+    Examples
+    --------
+    >>> from quadcurv.viewing import window_problem
+    >>> window_problem()  # doctest: +SKIP
+    'no display to open a window on (DISPLAY is not set)'
+    """
     if sys.platform == "linux" and not os.environ.get("DISPLAY"):
         return "no display to open a window on (DISPLAY is not set)"
     return opengl_problem()

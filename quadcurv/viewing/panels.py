@@ -56,6 +56,14 @@ def surfaces_figure(
     ------
     NoOpenGLError
         Nothing can render here.
+
+    Examples
+    --------
+    >>> import quadcurv as qc
+    >>> from quadcurv.viewing import surfaces_figure
+    >>> ball, _, _ = qc.surfaces.cubed_sphere().sample((4, 4), "faces")
+    >>> panels = {"jet": (ball, abs(qc.mean_curvature(ball) - 1))}
+    >>> surfaces_figure(panels, "error", (-4, -1)).savefig("error.png")  # doctest: +SKIP
     """
     problem = opengl_problem()
     if problem:

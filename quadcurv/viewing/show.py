@@ -46,6 +46,12 @@ def view(
     See Also
     --------
     quadcurv.viewing.window : the keys and buttons.
+
+    Examples
+    --------
+    >>> import quadcurv as qc
+    >>> ball, _, _ = qc.surfaces.cubed_sphere().sample((4, 4), "faces")
+    >>> qc.view(ball)  # doctest: +SKIP
     """
     problem = window_problem()
     if problem:
@@ -72,6 +78,13 @@ def maps(what: Any, field: str = "error", style: Style | None = None) -> pv.Plot
     ------
     ValueError
         Unknown field; limits of the style that do not fit its scale.
+
+    Examples
+    --------
+    >>> import quadcurv as qc
+    >>> from quadcurv.viewing import maps
+    >>> ball, _, _ = qc.surfaces.cubed_sphere().sample((4, 4), "faces")
+    >>> maps(ball, "mean_curvature").screenshot("H.png")  # doctest: +SKIP
     """
     return View(_comparison(what), field, style, off_screen=True).plotter
 
@@ -99,6 +112,15 @@ def html_page(what: Any, field: str = "mean_curvature", style: Style | None = No
     -----
     UserWarning
         It would take more than 20 MB: fields were left out, or it is larger nevertheless.
+
+    Examples
+    --------
+    >>> import quadcurv as qc
+    >>> from quadcurv.viewing import html_page
+    >>> ball, _, _ = qc.surfaces.cubed_sphere().sample((4, 4), "faces")
+    >>> page = html_page(ball)
+    >>> page.text[:15].lower()
+    '<!doctype html>'
     """
     return make_page(_comparison(what), field, style)
 
@@ -120,6 +142,17 @@ def save_maps(what: Any, path: str | Path, field: str = "error", style: Style | 
         A picture is asked for where nothing can render.
     ValueError
         Any other suffix; as for :func:`view`.
+
+    Examples
+    --------
+    >>> import os, tempfile
+    >>> import quadcurv as qc
+    >>> from quadcurv.viewing import save_maps
+    >>> ball, _, _ = qc.surfaces.cubed_sphere().sample((4, 4), "faces")
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     save_maps(ball, f"{folder}/H.html", "mean_curvature")
+    ...     os.listdir(folder)
+    ['H.html']
     """
     path = Path(path)
     if path.suffix == ".html":

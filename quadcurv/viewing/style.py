@@ -34,6 +34,12 @@ class Style:
     ValueError
         A direction without length, a size below 100 pixels, limits that do not ascend, an unknown colour
         map, a title of several lines.
+
+    Examples
+    --------
+    >>> from quadcurv.viewing import Style
+    >>> Style(camera=(1, 0, 0.5), limits=(-1, 1), title="A ball").limits
+    (-1, 1)
     """
 
     camera: tuple[float, float, float] | None = None

@@ -65,6 +65,14 @@ class View:
     ------
     ValueError
         Unknown field; limits of the style that do not fit its scale.
+
+    Examples
+    --------
+    >>> import quadcurv as qc
+    >>> from quadcurv.viewing import View
+    >>> ball, _, _ = qc.surfaces.cubed_sphere().sample((4, 4), "faces")
+    >>> view = View(qc.compare(ball, "jet"), off_screen=True)  # doctest: +SKIP
+    >>> view.plotter.screenshot("H.png")  # doctest: +SKIP
     """
 
     LEVELS = 6
