@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable
 from dataclasses import replace
 from importlib import import_module
@@ -16,7 +17,7 @@ from comparisons.chapter3 import measure as surfaces
 from comparisons.chapter4 import measure as formulas
 from comparisons.claims import judge, markdown
 from comparisons.measured import Measured
-from quadcurv import StaggeredGrid, boundary
+from quadcurv import StaggeredGrid
 from quadcurv.schemes import SCHEMES, Laplacian
 from quadcurv.surfaces import Surface, catenoid
 
@@ -57,16 +58,26 @@ def torsion_sign(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def ghost_weights(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Extrapolation of surfaces 0.2 off, its sum kept."""
-    right = boundary._weights
+    """Extrapolation of surfaces 0.2 off, the sum of its weights kept, wherever they are read."""
 
-    def wrong(*given, **named):
-        weights = right(*given, **named)
+    def off(weights):
+        weights = np.array(weights)
         weights[..., 0] += 0.2
         weights[..., 1] -= 0.2
         return weights
 
-    monkeypatch.setattr(boundary, "_weights", wrong)
+    found = 0
+    for module in [m for name, m in sys.modules.items() if name.startswith("quadcurv.boundary")]:
+        for name in ("_weights", "index_weights"):
+            if hasattr(module, name):
+                right = getattr(module, name)
+                monkeypatch.setattr(
+                    module, name, lambda *given, right=right, **named: off(right(*given, **named))
+                )
+                found += 1
+        if hasattr(module, "_WEIGHTS"):
+            monkeypatch.setattr(module, "_WEIGHTS", off(module._WEIGHTS))
+    assert found
 
 
 def no_dual_points_of_curves(monkeypatch: pytest.MonkeyPatch) -> None:
