@@ -25,7 +25,6 @@ from quadcurv import surfaces, viewing
 from quadcurv.comparison import compare
 from quadcurv.refinement import Convergence, convergence
 from quadcurv.schemes import SCHEMES, cotan
-from quadcurv.schemes.cotan import cotan_matrices
 from quadcurv.schemes.finite_volume import FINITE_VOLUME
 from quadcurv.schemes.liu import LIU
 from quadcurv.stencils import Stencils
@@ -166,8 +165,7 @@ def factor_of_4_1(n: int = 32) -> float:
     surface = surfaces.cylinder()
     mesh, *_ = surface.sample((n, n))
     stencils: Stencils = mesh.stencils()
-    triangles = np.concatenate((stencils.faces[:, [0, 1, 2]], stencils.faces[:, [2, 3, 0]]))
-    stiffness, mixed = cotan_matrices(stencils.points, triangles, "voronoi")
+    stiffness, mixed = cotan(6, "voronoi").assemble(stencils)
     # libigl's stiffness has (cot + cot) / 2 as weights.
     printed = 3 / (2 * mixed[:, None]) * 2 * (stiffness @ stencils.points)
     inside = stencils.closed

@@ -9,13 +9,13 @@ import subprocess
 import sys
 import time
 
+import igl
 import numpy as np
 from rich.console import Console
 from rich.table import Table
 
 from quadcurv import QuadMesh, mean_curvature
 from quadcurv.schemes import SCHEMES, as_scheme
-from quadcurv.schemes.cotan import cotan_matrices
 from quadcurv.surfaces import torus
 from quadcurv.tables import progress
 
@@ -34,9 +34,10 @@ def measure(case: str, side: int) -> dict[str, float]:
     mean_curvature(mesh_of(8), "cotan-6" if case == PLAIN else case)  # compile and import first
     start = time.perf_counter()
     if case == PLAIN:
-        faces = mesh.faces
+        faces = mesh.faces.astype(np.int64)
         triangles = np.concatenate((faces[:, [0, 1, 2]], faces[:, [2, 3, 0]]))
-        cotan_matrices(mesh.points, triangles, "barycentric")
+        igl.cotmatrix(mesh.points, triangles)
+        igl.massmatrix(mesh.points, triangles, igl.MASSMATRIX_TYPE_BARYCENTRIC)
     else:
         mean_curvature(mesh, as_scheme(case))
     seconds = time.perf_counter() - start
