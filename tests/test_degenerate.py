@@ -77,7 +77,7 @@ def test_thin_triangles_are_as_exact_as_their_positions(scheme, kind, size):
         assert np.linalg.norm(Hn - expected, axis=1).max() < (1e-11 + 10 * rounding) * np.abs(expected).max()
 
 
-@each
+@each_laplacian
 @pytest.mark.parametrize("kind", ["needle", "cap"])
 @pytest.mark.parametrize("size", [1e-5, 1e-7, 1e-9, 1e-11, 1e-13, 1e-14, 1e-15, 1e-17, 0.0])
 def test_thinner_ones_are_nan_at_the_triangle_alone(scheme, kind, size):
@@ -85,14 +85,20 @@ def test_thinner_ones_are_nan_at_the_triangle_alone(scheme, kind, size):
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         H = qc.mean_curvature((points, triangles), scheme)
-    around = np.unique(triangles[-3:])
     missing = np.flatnonzero(np.isnan(H))
-    assert set(missing) <= set(around)
-    if isinstance(scheme, Laplacian):
-        assert (missing.size > 0) == (size < 3e-14) or 1e-14 <= size <= 1e-13
-        with_area, _ = with_thin_triangle(kind, 1e-13, seed=3)
-        there = np.abs(qc.mean_curvature((with_area, triangles), scheme))
-        assert np.nanmax(np.abs(H), initial=0) < 2 * np.nanmax(there)
+    assert set(missing) <= set(np.unique(triangles[-3:]))
+    if size >= 1e-12:
+        assert missing.size == 0
+    elif size <= 1e-15 and scheme.name != "finite_volume":  # which looks across a triangle without area
+        assert missing.size >= 3
+    right = qc.mean_curvature(with_thin_triangle(kind, 1e-5, seed=3), scheme)
+    assert np.nanmax(np.abs(H) * dual(points, triangles)) < 2 * np.nanmax(
+        np.abs(right) * dual(points, triangles)
+    )
+
+
+def dual(points, triangles):
+    return qc.dual_areas((points, triangles), "liu")
 
 
 @pytest.mark.parametrize("kind", ["needle", "cap"])
@@ -102,7 +108,7 @@ def test_compare_survives(kind, size):
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         found = qc.compare((points, triangles), tuple(SCHEMES))
-    assert all(np.isfinite(H).sum() >= len(points) - 4 for H in found.values.values())
+    assert all(np.isfinite(H).sum() >= len(points) - 4 for H in found.mean_curvature.values())
 
 
 # ---- faces without area ---------------------------------------------------------------------------------
@@ -144,7 +150,8 @@ def test_slivers_of_a_turned_plane(scheme, seed, scale, offset):
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", qc.PrecisionWarning)
         H = qc.mean_curvature(mesh, scheme)
-    assert np.isnan(H[sliver]).all()
+    if scheme.name != "finite_volume":  # it looks across the slivers, and is right there
+        assert np.isnan(H[sliver]).all()
     inside = np.setdiff1d(np.flatnonzero(mesh.stencils().closed), sliver)
     assert np.isfinite(H[inside]).all()
     assert np.nanmax(np.abs(H)) < 1e3 * 2.0**-52 * np.abs(points).max() / h**2
