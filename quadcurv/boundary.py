@@ -338,7 +338,7 @@ def with_ghosts(mesh: Stencils, layer: Ghosts) -> tuple[Stencils, Floats]:
     points = np.concatenate((mesh.points, beside.reshape(-1, 3), corner.reshape(-1, 3)))
     faces = np.concatenate((mesh.faces, layer.quads))
     rough = np.concatenate((np.zeros(mesh.n), np.repeat(rough, layer.layers), rough_corner.ravel()))
-    return Stencils(points, faces, mesh.shape, layer.closed, mesh.orientable), rough
+    return Stencils(points, faces, mesh.shape, layer.closed, mesh.orientable, mesh.polygons), rough
 
 
 def _roughness(mesh: Stencils) -> tuple[Stencils, Floats]:

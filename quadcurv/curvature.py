@@ -21,7 +21,7 @@ from quadcurv.types import Floats
 DEFAULT = "jet"
 """Scheme of H, K, k1 and k2 where none is named, so that H = (k1 + k2) / 2."""
 
-DEFAULT_MATRIX = "liu"
+DEFAULT_MATRIX = "bilinear"
 """Scheme of matrices and dual areas where none is named: unlike others it sees a checkerboard."""
 
 

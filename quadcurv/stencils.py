@@ -137,20 +137,24 @@ class Stencils:
 
     @cached_property
     def ring_areas(self) -> Floats:
-        """(n, 3) float64: half the vector area of each ring polygon; it points along the normal."""
-        from quadcurv.kernels import faces
+        """(n, 3) float64: half the vector area of each ring polygon; it points along the normal.
+
+        Zero where there is none but for rounding.
+        """
+        from quadcurv.kernels import faces, vector
 
         if self.orientable:
-            normal = np.zeros_like(self.points)
-            faces.ring_normals(self.points, self.faces, normal)
-            normal = normal[: self.n]
+            sums = np.zeros((len(self.points), 4))
+            faces.ring_normals(self.points, self.faces, sums)
+            sums = sums[: self.n]
         else:  # faces disagree somewhere: the corner table has each ring turned one way
             indptr, c, a, _, b = self.corner_table
-            corner = np.cross(self.points[a] - self.points[c], self.points[b] - self.points[c])
-            sums = scipy.sparse.csr_array((np.full(c.size, 0.25), np.arange(c.size), indptr))
-            normal = sums @ corner
-        # A length that is lost to underflow gives no direction.
-        normal[np.einsum("ix,ix->i", normal, normal) < np.finfo(float).tiny] = 0
+            u, v = self.points[a] - self.points[c], self.points[b] - self.points[c]
+            corner = np.column_stack((np.cross(u, v) / 4, (u**2 + v**2).sum(axis=1)))
+            sums = scipy.sparse.csr_array((np.ones(c.size), np.arange(c.size), indptr)) @ corner
+        normal, edges = sums[:, :3].copy(), sums[:, 3]
+        square, far = (np.einsum("ix,ix->i", x, x) for x in (4 * normal, self.points[: self.n]))
+        normal[~(square > np.maximum(vector.rounding(edges, far), np.finfo(float).tiny))] = 0
         return normal
 
     @cached_property

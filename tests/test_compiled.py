@@ -19,7 +19,7 @@ import numpy as np
 logging.basicConfig(level=logging.INFO, stream=sys.stdout, format="said %(name)s %(message)s")
 from quadcurv.kernels import faces
 square = np.array([(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0)], float)
-normal = np.zeros((4, 3))
+normal = np.zeros((4, 4))
 {before}
 faces.ring_normals(square, np.array([(0, 1, 2, 3)], np.int32), normal)
 print(normal[:, 2].sum())
@@ -85,7 +85,7 @@ def test_an_edit_to_a_helper_in_another_file_is_seen(copy):
 
 
 def test_several_kernels_are_announced_once(copy):
-    other = "faces.conductances(square, np.array([(0, 1, 2, 3)], np.int32))"
+    other = "faces.quad_fluxes(square, np.array([(0, 1, 2, 3)], np.int32), np.zeros((4, 3)), np.zeros(4))"
     assert copy.run(other) == (1.0, 1)
     assert len(copy.files()) == 2
 

@@ -5,11 +5,13 @@ from __future__ import annotations
 import igl
 import numpy as np
 import pytest
+import trimesh
 
 import quadcurv as qc
 from quadcurv import surfaces
 from quadcurv.refinement import fitted_rate
 from quadcurv.schemes import alexa_wardetzky, bunge, de_goes
+from quadcurv.schemes.assembly import MOST_SIDES
 
 POLYGON = ["bunge", "de_goes", "alexa_wardetzky"]
 each = pytest.mark.parametrize("scheme", POLYGON)
@@ -76,7 +78,7 @@ def test_bunge_is_libigl(skew):
     assert np.abs(qc.dual_areas(skew, "bunge") - np.asarray(M.sum(axis=1)).ravel()).max() < 1e-11
 
 
-def quad_literally(x, scheme, weight):
+def polygon_literally(x, scheme, weight):
     """Papers' matrices for one polygon, written with explicit loops and a null space by SVD."""
     k = len(x)
     edge = np.array([x[(i + 1) % k] - x[i] for i in range(k)])
@@ -105,7 +107,7 @@ def test_published_matrices(skew, factory, weight):
     scheme = factory(weight)
     expected = np.zeros((len(skew.points),) * 2)
     for face in skew.faces:
-        expected[np.ix_(face, face)] += quad_literally(skew.points[face], scheme.name, weight)
+        expected[np.ix_(face, face)] += polygon_literally(skew.points[face], scheme.name, weight)
     assert np.abs(qc.stiffness_matrix(skew, scheme).toarray() - expected).max() < 1e-12
 
 
@@ -151,6 +153,109 @@ def test_face_without_area_is_nan_at_its_corners_alone(scheme):
     assert set(face) <= set(missing)
     touched = np.unique(mesh.faces[np.isin(mesh.faces, face).any(axis=1)])
     assert set(missing) <= set(touched)
+
+
+# ---- more than four sides ----------------------------------------------------------------------------------
+
+
+def dual_of_an_icosphere(subdivisions):
+    """Points on the unit sphere, and one pentagon or hexagon around each vertex of the icosphere."""
+    ball = trimesh.creation.icosphere(subdivisions)
+    corners = np.asarray(ball.vertices)[ball.faces].mean(axis=1)
+    beside = {}
+    for f, (a, b, c) in enumerate(ball.faces.tolist()):
+        beside |= {(a, b): (f, c), (b, c): (f, a), (c, a): (f, b)}
+    polygons = {}
+    for start, end in beside:
+        if start not in polygons:
+            polygons[start], turn = [], end
+            while not polygons[start] or turn != end:
+                face, turn = beside[start, turn]
+                polygons[start].append(face)
+    return corners / np.linalg.norm(corners, axis=1, keepdims=True), list(polygons.values())
+
+
+@each
+def test_hexagons_of_a_sphere(scheme):
+    points, polygons = dual_of_an_icosphere(3)
+    H = qc.mean_curvature((points, polygons), scheme)
+    assert np.abs(H - 1).max() < (1e-3 if scheme == "bunge" else 0.06)
+    assert qc.dual_areas((points, polygons), scheme).sum() == pytest.approx(4 * np.pi, rel=0.01)
+
+
+@each
+def test_a_dodecahedron_has_the_curvature_of_its_sphere(scheme):
+    """By symmetry the curvature normal is radial, and its size is flux over area of any one vertex."""
+    points, polygons = dual_of_an_icosphere(0)
+    assert {len(p) for p in polygons} == {5}
+    H = qc.mean_curvature((points, polygons), scheme)
+    assert np.ptp(H) < 1e-12
+    assert H[0] == pytest.approx(1, abs=0.01)
+
+
+@pytest.fixture
+def bent():
+    """Hexagons, pentagons and quads, none of them planar, and triangles."""
+    points, polygons = dual_of_an_icosphere(1)
+    moved = points * np.array([1.0, 1.3, 0.8]) + np.random.default_rng(2).normal(0, 0.03, points.shape)
+    cut = [part for p in polygons[:20] for part in (p[:4], [*p[3:], p[0]])]
+    return qc.QuadMesh(moved, cut + polygons[20:])
+
+
+def faces_of(mesh):
+    """Faces as given, those of more than four sides last."""
+    whole = mesh.stencils().polygons
+    small = mesh.faces[whole.face < 0].tolist()
+    return [[v for v in f if v >= 0] for f in small] + [
+        f.tolist() for f in np.split(whole.corners, whole.indptr[1:-1])
+    ]
+
+
+@pytest.mark.parametrize("factory", [de_goes, alexa_wardetzky])
+def test_published_matrices_of_polygons(bent, factory):
+    scheme, x = factory(), bent.points
+    assert {len(face) for face in faces_of(bent)} == {3, 4, 5, 6}
+    expected = np.zeros((len(x), len(x)))
+    for face in faces_of(bent):
+        expected[np.ix_(face, face)] += polygon_literally(x[face], scheme.name, 1.0)
+    assert np.abs(qc.stiffness_matrix(bent, scheme).toarray() - expected).max() < 1e-12
+
+
+def test_bunge_on_polygons_is_libigl(bent):
+    faces = faces_of(bent)
+    ends = np.cumsum([0, *map(len, faces)])
+    L, M, _ = igl.cotmatrix(np.array(bent.points), np.concatenate(faces).astype(np.int64), ends)
+    assert abs(qc.stiffness_matrix(bent, "bunge") + L).max() < 1e-10
+    assert np.abs(qc.dual_areas(bent, "bunge") - np.asarray(M.sum(axis=1)).ravel()).max() < 1e-10
+
+
+@each
+@pytest.mark.parametrize(
+    "flat",
+    [
+        [(0, 0), (2, 0), (2, 1), (1, 1), (1, 2), (0, 2)],
+        [(0, 0), (3, 0), (3, 3), (2, 3), (2, 1), (1, 1), (1, 3), (0, 3)],
+    ],
+)
+def test_linear_precision_of_concave_polygons(scheme, flat):
+    """L and U: rows of S x are the flux through the two edges of each corner."""
+    points = np.column_stack((flat, np.zeros(len(flat))))
+    S = qc.stiffness_matrix((points, [range(len(flat))]), scheme)
+    across = np.roll(points, -1, axis=0) - np.roll(points, 1, axis=0)
+    expected = np.column_stack((across[:, 1], -across[:, 0])) / 2
+    assert np.abs(S @ points[:, :2] - expected).max() < 1e-13
+    assert np.linalg.eigvalsh(S.toarray())[0] > -1e-13
+
+
+@each
+@pytest.mark.parametrize("sides", [MOST_SIDES, MOST_SIDES + 1, 5_000])
+def test_polygons_of_very_many_sides_are_cut(scheme, sides):
+    angle = 2 * np.pi * np.arange(sides) / sides
+    points = np.column_stack((np.cos(angle), np.sin(angle), np.zeros(sides)))
+    S = qc.stiffness_matrix((points, [range(sides)]), scheme)
+    assert (S.nnz == sides**2) == (sides == MOST_SIDES)
+    u = points[:, 0]
+    assert u @ S @ u == pytest.approx(np.pi, rel=1e-3)
 
 
 def test_rejections():

@@ -8,6 +8,7 @@ import numpy as np
 import scipy
 
 from quadcurv.schemes import Laplacian
+from quadcurv.schemes.assembly import ring_areas
 from quadcurv.stencils import Stencils
 from quadcurv.types import Floats
 
@@ -24,15 +25,18 @@ def evaluate(given: Stencils, treated: Stencils, scheme: Laplacian, results: Map
     """Write results by name; `treated` has its boundary closed, dual areas are those of `given`."""
     if "dual_areas" in results:
         results["dual_areas"][...] = flux_and_area(given, scheme)[1].reshape(given.shape)
+    if results.keys() <= {"dual_areas"}:
+        return
+    normals = unit_normals(treated, scheme)
     if "vertex_normals" in results:
-        results["vertex_normals"][...] = unit_normals(treated).reshape(*treated.shape, 3)
+        results["vertex_normals"][...] = normals.reshape(*treated.shape, 3)
     if results.keys() <= {"dual_areas", "vertex_normals"}:
         return
     Hn = mean_curvature_normal(treated, scheme)
     if "mean_curvature_normal" in results:
         results["mean_curvature_normal"][...] = Hn.reshape(*treated.shape, 3)
     if "mean_curvature" in results:
-        H = -np.einsum("ix,ix->i", Hn, unit_normals(treated))
+        H = -np.einsum("ix,ix->i", Hn, normals)
         results["mean_curvature"][...] = (H if treated.orientable else np.abs(H)).reshape(treated.shape)
 
 
@@ -46,18 +50,19 @@ def flux_and_area(stencils: Stencils, scheme: Laplacian) -> tuple[Floats, Floats
 
 
 def mean_curvature_normal(stencils: Stencils, scheme: Laplacian) -> Floats:
-    """(n, 3): NaN in open rings and where it is not finite."""
+    """(n, 3): NaN in open rings, where it is not finite, and where the scheme's area is not positive."""
     flux, area = flux_and_area(stencils, scheme)
     with np.errstate(divide="ignore", invalid="ignore"):
         Hn = flux / (2 * area[:, None])
-    Hn[~stencils.closed | ~np.isfinite(Hn).all(axis=1)] = np.nan
+    Hn[~stencils.closed | ~(area > 0) | ~np.isfinite(Hn).all(axis=1)] = np.nan
     return Hn
 
 
-def unit_normals(stencils: Stencils) -> Floats:
-    """(n, 3): directions of the ring polygons' vector areas, NaN where these vanish."""
+def unit_normals(stencils: Stencils, scheme: Laplacian) -> Floats:
+    """(n, 3): directions of the vector areas of the rings that a scheme sees, NaN where these vanish."""
+    areas = ring_areas(stencils) if scheme.polygons else stencils.ring_areas
     with np.errstate(divide="ignore", invalid="ignore"):
-        return stencils.ring_areas / np.linalg.norm(stencils.ring_areas, axis=1, keepdims=True)
+        return areas / np.linalg.norm(areas, axis=1, keepdims=True)
 
 
 def without_infinity(matrix: scipy.sparse.csr_array) -> scipy.sparse.csr_array:

@@ -11,6 +11,7 @@ from quadcurv.kernels.rows import (
     FIRST,
     LENGTH,
     NORMAL,
+    QUAD_SQUARE,
     RING,
     RING_SCALE,
     ROW,
@@ -29,11 +30,11 @@ from quadcurv.kernels.rows import (
     unit_normals,
     vector_curvatures,
 )
-from quadcurv.kernels.vector import apart, cross, dot, less, place, plus, times, triple, unit
+from quadcurv.kernels.vector import apart, cross, dot, known_square, less, place, plus, times, triple, unit
 
-# In `work`, `NORMAL` and `LENGTH` are of the quads beside the points of row p. Those below them:
-BELOW, BELOW_LENGTH = 17 * S, 20 * S
-ROOMS = (4 * ROW, ROW + Y, 21 * S)
+# In `work`, `NORMAL`, `QUAD_SQUARE`, `LENGTH` are of the quads beside the points of row p. Those below them:
+BELOW, BELOW_SQUARE, BELOW_LENGTH = 18 * S, 21 * S, 22 * S
+ROOMS = (4 * ROW, ROW + Y, 23 * S)
 
 
 def below(planes, p, q, b, i):
@@ -58,7 +59,8 @@ def first_fluxes(planes, p, q, b, part, width):
     """Begin the sums of row q."""
     for i in span(FIRST, FIRST + width):
         u, v = below(planes, p, q, b, i)
-        n, part[i + ROW] = unit(cross(u, v))
+        n = cross(u, v)
+        n, part[i + ROW] = unit(n, known_square(n, u, v, triple(planes, p + i, Y)))
         place(part, i, Y, fluxes(u, v, n)[0])
 
 
@@ -66,7 +68,9 @@ def first_fluxes(planes, p, q, b, part, width):
 def first_edge(planes, p, a, b, work):
     """The edge to the left of the first point of row p."""
     u, v = beside_right(planes, p, a, b, FIRST - 1)
-    n, work[FIRST - 1 + LENGTH] = unit(cross(u, v))
+    n = cross(u, v)
+    square = known_square(n, u, v, triple(planes, p + FIRST - 1, Y))
+    n, work[FIRST - 1 + LENGTH] = unit(n, square)
     place(work, FIRST - 1 + NORMAL, S, n)
 
 
@@ -75,24 +79,28 @@ def edge_and_ring_normals(planes, p, q, a, b, work, g):
     """Normals of the quads below and beside row p, and of the rings around it."""
     for k in span(0, STRETCH):
         i, j = FIRST + g + k, FIRST + k
-        u, v = below(planes, p, q, b, i)
-        place(work, j + BELOW, S, cross(u, v))
-        u, v = beside_right(planes, p, a, b, i)
-        place(work, j + NORMAL, S, cross(u, v))
-        u = apart(planes, b + i + 1, planes, a + i, Y)
-        v = apart(planes, a + i + 1, planes, b + i, Y)
-        n = cross(u, v)
-        place(work, j + RING, S, n)
-        work[j + SQUARE] = dot(n, n)
+        point = triple(planes, p + i, Y)
+        ring = apart(planes, b + i + 1, planes, a + i, Y), apart(planes, a + i + 1, planes, b + i, Y)
+        for normal, square, (u, v) in (
+            (BELOW, BELOW_SQUARE, below(planes, p, q, b, i)),
+            (NORMAL, QUAD_SQUARE, beside_right(planes, p, a, b, i)),
+            (RING, SQUARE, ring),
+        ):
+            n = cross(u, v)
+            place(work, j + normal, S, n)
+            work[j + square] = known_square(n, u, v, point)
 
 
 @formula
 def edge_scales(work):
     """Make normals of quads of length one; scales from the squares of the rings' normals."""
     for j in span(FIRST, FIRST + STRETCH, 2):
-        for plane, lengths in ((BELOW, BELOW_LENGTH), (NORMAL, LENGTH)):
-            n, length = unit(triple(work, j + plane, S))
-            place(work, j + plane, S, n)
+        for normal, square, lengths in (
+            (BELOW, BELOW_SQUARE, BELOW_LENGTH),
+            (NORMAL, QUAD_SQUARE, LENGTH),
+        ):
+            n, length = unit(triple(work, j + normal, S), work[j + square])
+            place(work, j + normal, S, n)
             work[j + lengths] = length
         work[j + SCALE] = ring_scale(work[j + SQUARE])
 

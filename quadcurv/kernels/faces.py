@@ -4,7 +4,7 @@ import numpy as np
 
 from quadcurv.kernels.compiled import flat, kernel
 from quadcurv.kernels.formulas import formula, root
-from quadcurv.kernels.vector import apart, cross, dot, times
+from quadcurv.kernels.vector import apart, cross, dot, known_square, plus, times, triple, unless_zero
 
 
 def add(sums, v, a):
@@ -23,74 +23,69 @@ def edge(points, a, b):
     return apart(points, 3 * b, points, 3 * a, 1)
 
 
+def half_over_length(n, u, v, point):
+    """1 / (2 |n|) of n = u x v beside a point, NaN where n is zero but for rounding."""
+    return unless_zero(0.5 / root(dot(n, n)), known_square(n, u, v, point))
+
+
 @formula
 def add_quad(points, faces, f, flux, area):
     """Half fluxes and a quarter of the area of a quad."""
     h, i, j, k = vertices(faces, f)
     u, v = edge(points, h, j), edge(points, i, k)
     n = cross(u, v)
-    length = root(dot(n, n))
-    scale = 0.5 / length
+    scale = half_over_length(n, u, v, triple(points, 3 * h, 1))
     first, second = times(cross(v, n), scale), times(cross(n, u), scale)
     add(flux, h, first)
     add(flux, i, second)
     add(flux, j, times(first, -1))
     add(flux, k, times(second, -1))
     for c in (h, i, j, k):
-        area[c] += 0.125 * length
+        area[c] += 0.125 * root(dot(n, n))
 
 
 @formula
-def add_flap(points, corners, t, flux):
+def add_flap(points, corners, t, origin, flux):
     """Half flux of a corner (c, a, d, b) into c."""
     c, a, d, b = vertices(corners, t)
     u, v = edge(points, c, d), edge(points, a, b)
-    n = cross(u, v)
-    add(flux, c, times(cross(v, n), 0.5 / root(dot(n, n))))
+    n, point = cross(u, v), plus(triple(points, 3 * c, 1), triple(origin, 0, 1))
+    add(flux, c, times(cross(v, n), half_over_length(n, u, v, point)))
 
 
 @formula
 def add_triangle(points, faces, f, flux, area):
     """Cotan fluxes and a third of the area of a triangle."""
     corners = vertices(faces, f, 3)
-    n = cross(edge(points, corners[0], corners[1]), edge(points, corners[0], corners[2]))
-    length = root(dot(n, n))
+    u, v = edge(points, corners[0], corners[1]), edge(points, corners[0], corners[2])
+    n = cross(u, v)
+    scale = half_over_length(n, u, v, triple(points, 3 * corners[0], 1))
     for s, c in enumerate(corners):
         # Cotan weights at c sum to the opposite edge, turned by 90 degrees into the triangle, halved.
         opposite = edge(points, corners[s - 2], corners[s - 1])
-        add(flux, c, times(cross(opposite, n), 0.5 / length))
-        area[c] += length / 6
+        add(flux, c, times(cross(opposite, n), scale))
+        area[c] += root(dot(n, n)) / 6
 
 
-def add_corners(points, corners, normal):
-    """A quarter of (a - c) x (b - c) of each corner c of a face."""
+def add_corners(points, corners, sums):
+    """A quarter of (a - c) x (b - c) of each corner c of a face, and the squares of these factors."""
     for s, c in enumerate(corners):
-        n = cross(edge(points, c, corners[s + 1 - len(corners)]), edge(points, c, corners[s - 1]))
-        add(normal, c, times(n, 0.25))
+        u, v = edge(points, c, corners[s + 1 - len(corners)]), edge(points, c, corners[s - 1])
+        n = times(cross(u, v), 0.25)
+        for x, more in enumerate((*n, dot(u, u) + dot(v, v))):
+            sums[4 * c + x] += more
 
 
 @formula
-def add_quad_corners(points, faces, f, normal):
+def add_quad_corners(points, faces, f, sums):
     """As `add_corners`, of a quad."""
-    add_corners(points, vertices(faces, f), normal)
+    add_corners(points, vertices(faces, f), sums)
 
 
 @formula
-def add_triangle_corners(points, faces, f, normal):
+def add_triangle_corners(points, faces, f, sums):
     """As `add_corners`, of a triangle."""
-    add_corners(points, vertices(faces, f, 3), normal)
-
-
-@formula
-def quad_conductance(points, quads, f, conductance):
-    """Entries of K."""
-    h, i, j, k = vertices(quads, f)
-    u, v = edge(points, h, j), edge(points, i, k)
-    n = cross(u, v)
-    scale = 0.5 / root(dot(n, n))
-    conductance[4 * f] = scale * dot(v, v)
-    conductance[4 * f + 1] = conductance[4 * f + 2] = -scale * dot(u, v)
-    conductance[4 * f + 3] = scale * dot(u, u)
+    add_corners(points, vertices(faces, f, 3), sums)
 
 
 @kernel
@@ -106,14 +101,17 @@ def quad_fluxes(points, faces, flux, area):
 
 
 @kernel
-def _flap_fluxes(points, corners, flux):
+def _flap_fluxes(points, corners, origin, flux):
     for t in range(corners.size // 4):
-        add_flap(points, corners, t, flux)
+        add_flap(points, corners, t, origin, flux)
 
 
-def flap_fluxes(points, corners, flux):
-    """Add to each corner's centre the half flux of (c, a, d, b), to no other vertex."""
-    _flap_fluxes(flat(points), flat(corners, np.int32), flux.ravel())
+def flap_fluxes(points, corners, origin, flux):
+    """Add to each corner's centre the half flux of (c, a, d, b), to no other vertex.
+
+    Points are relative to `origin` (3,).
+    """
+    _flap_fluxes(flat(points), flat(corners, np.int32), flat(origin), flux.ravel())
 
 
 @kernel
@@ -129,27 +127,17 @@ def triangle_fluxes(points, faces, flux, area):
 
 
 @kernel
-def _ring_normals(points, faces, normal):
+def _ring_normals(points, faces, sums):
     for f in range(faces.size // 4):
         if faces[4 * f + 3] >= 0:
-            add_quad_corners(points, faces, f, normal)
+            add_quad_corners(points, faces, f, sums)
         else:
-            add_triangle_corners(points, faces, f, normal)
+            add_triangle_corners(points, faces, f, sums)
 
 
-def ring_normals(points, faces, normal):
-    """Add to each vertex half the vector area of its ring polygon, corner by corner (a - c) x (b - c)."""
-    _ring_normals(flat(points), flat(faces, np.int32), normal.ravel())
+def ring_normals(points, faces, sums):
+    """Add to each vertex half the vector area of its ring polygon, corner by corner (a - c) x (b - c).
 
-
-@kernel
-def _conductances(points, quads, found):
-    for f in range(quads.size // 4):
-        quad_conductance(points, quads, f, found)
-
-
-def conductances(points, quads):
-    """K (m, 2, 2) with half fluxes K (u, v) into a quad's first two vertices."""
-    found = np.empty((len(quads), 2, 2))
-    _conductances(flat(points), flat(quads, np.int32), found.ravel())
-    return found
+    The fourth of the `sums` (p, 4) is that of the squares of all these factors.
+    """
+    _ring_normals(flat(points), flat(faces, np.int32), sums.ravel())

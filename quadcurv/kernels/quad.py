@@ -23,6 +23,8 @@ processor to overlap:
   near, and memory is read and written evenly, ahead of its use.
 * Roots are Newton's rather than the processor's, which take five cycles a number whatever else is done.
 
+What has no area but for rounding, a quad or a ring, has a square of 0 (`known_square`): its normal is NaN.
+
 Every vertex sums its quads in the same order however the work is cut: results are bitwise the same.
 """
 
@@ -30,6 +32,7 @@ from quadcurv.kernels.vector import (
     cross,
     dot,
     fused_cross,
+    known_square,
     quotient,
     reciprocal_root,
     unless_zero,
@@ -64,9 +67,8 @@ def quads_area(lengths):
     return 0.125 * lengths
 
 
-def conductance(u, v):
+def conductance(u, v, point):
     """K_00 and K_01 of a quad: K (u, v) are the half fluxes into its first two vertices."""
     n = cross(u, v)
-    square = dot(n, n)
-    scale = 0.5 * unless_zero(reciprocal_root(square), square)
+    scale = 0.5 * unless_zero(reciprocal_root(dot(n, n)), known_square(n, u, v, point))
     return scale * dot(v, v), -scale * dot(u, v)

@@ -15,15 +15,26 @@ from quadcurv.kernels.quad import (
     ring_area,
     ring_scale,
 )
-from quadcurv.kernels.vector import apart, cross, dot, fused_cross, place, plus, times, triple, unit
+from quadcurv.kernels.vector import (
+    apart,
+    cross,
+    dot,
+    fused_cross,
+    known_square,
+    place,
+    plus,
+    times,
+    triple,
+    unit,
+)
 
 BLOCK = 64  # vertices done at once: their rings stay in the first-level cache
 AHEAD = 16  # vertices: where the points of rings lie far apart, they are asked for that early
 POINT = 3 * BLOCK  # between points
 CORNERS = 4 * BLOCK  # between planes of what there is of every corner
-# In `work`: normals of corners and their lengths; normals of rings; what sums of fluxes are multiplied by;
-# dual areas.
-LENGTH, RING, SCALE, AREA = (k * BLOCK for k in (12, 16, 19, 20))
+# In `work`: normals of corners, their lengths and squares; normals of rings; what sums of fluxes are
+# multiplied by; dual areas.
+LENGTH, SQUARE, RING, SCALE, AREA = (k * BLOCK for k in (12, 16, 20, 23, 24))
 # For the stiffness: weights of the nine points; `conductance` of corners.
 OWN, MIXED = 9 * BLOCK, 13 * BLOCK
 
@@ -54,14 +65,16 @@ def corner_normals(x, work, corner, a, b):
     """Normals (d - c) x (b - a) of one corner of every vertex c of a block."""
     for k in span(0, BLOCK):
         u, v = apart(x, a + POINT + k, x, k, BLOCK), apart(x, b + k, x, a + k, BLOCK)
-        place(work, corner * BLOCK + k, CORNERS, cross(u, v))
+        n = cross(u, v)
+        place(work, corner * BLOCK + k, CORNERS, n)
+        work[SQUARE + corner * BLOCK + k] = known_square(n, u, v, triple(x, k, BLOCK))
 
 
 @formula
 def corner_units(work):
     """Make normals of corners of length one."""
     for k in span(0, CORNERS, 4):
-        n, length = unit(triple(work, k, CORNERS))
+        n, length = unit(triple(work, k, CORNERS), work[SQUARE + k])
         place(work, k, CORNERS, n)
         work[LENGTH + k] = length
 
@@ -72,7 +85,7 @@ def ring_normals(x, work):
     for k in span(0, BLOCK, 2):
         u, v = apart(x, edge(2) + k, x, edge(0) + k, BLOCK), apart(x, edge(3) + k, x, edge(1) + k, BLOCK)
         n = cross(u, v)
-        square = dot(n, n)
+        square = known_square(n, u, v, triple(x, k, BLOCK))
         work[SCALE + k] = scale = ring_scale(square)
         work[AREA + k] = ring_area(square)
         place(work, RING + k, BLOCK, times(n, scale))
@@ -171,7 +184,7 @@ def ring_curvatures(points, ring, far, liu, Hn, H, normal, area, start, stop):
         As for `grid_curvatures`.
     """
     _pass(
-        points, ring, far, liu, Hn, H, normal, area, start, stop, np.zeros(27 * BLOCK), np.zeros(21 * BLOCK)
+        points, ring, far, liu, Hn, H, normal, area, start, stop, np.zeros(27 * BLOCK), np.zeros(25 * BLOCK)
     )
 
 
@@ -180,7 +193,9 @@ def corner_weights(x, work, corner, a, b):
     """`conductance` of one corner of every vertex of a block."""
     for k in span(0, BLOCK):
         u, v = apart(x, a + POINT + k, x, k, BLOCK), apart(x, b + k, x, a + k, BLOCK)
-        work[OWN + corner * BLOCK + k], work[MIXED + corner * BLOCK + k] = conductance(u, v)
+        work[OWN + corner * BLOCK + k], work[MIXED + corner * BLOCK + k] = conductance(
+            u, v, triple(x, k, BLOCK)
+        )
 
 
 @formula

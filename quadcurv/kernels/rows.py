@@ -13,7 +13,7 @@ import numpy as np
 from quadcurv.kernels.compiled import kernel
 from quadcurv.kernels.formulas import Carried, formula, prefetch, span, where
 from quadcurv.kernels.quad import fluxes, quads_area, quads_scale, ring_area, ring_scale
-from quadcurv.kernels.vector import apart, cross, dot, less, place, plus, times, triple, unit
+from quadcurv.kernels.vector import apart, cross, dot, known_square, less, place, plus, times, triple, unit
 
 WIDTH = 2048  # columns done at once: their rows stay in the second-level cache
 STRETCH = 64  # of them, by one loop after the other: what these leave stays in the first-level cache
@@ -23,12 +23,12 @@ Y = WIDTH + PAGE // 2  # between planes of a row
 ROW = 3 * Y  # between rows
 S = STRETCH + 8  # between planes of a stretch
 FIRST = 8  # place of the first vertex in a plane, its left neighbour before it
-# In `work`: normals of quads, their lengths, diagonals; normals of rings, their squares and scales;
+# In `work`: normals of quads, their squares, lengths, diagonals; normals of rings, their squares and scales;
 # what sums of fluxes are multiplied by; what dual areas come from.
-NORMAL, LENGTH, U, V, RING, SQUARE, RING_SCALE, SCALE, AREA = (
-    k * S for k in (0, 3, 4, 7, 10, 13, 14, 15, 16)
+NORMAL, QUAD_SQUARE, LENGTH, U, V, RING, SQUARE, RING_SCALE, SCALE, AREA = (
+    k * S for k in (0, 3, 4, 5, 8, 11, 14, 15, 16, 17)
 )
-ROOMS = (4 * ROW, ROW + Y, 17 * S, 3 * S)  # planes, part, work, and where vectors go that nobody wants
+ROOMS = (4 * ROW, ROW + Y, 18 * S, 3 * S)  # planes, part, work, and where vectors go that nobody wants
 
 
 def rooms(sizes):
@@ -66,7 +66,9 @@ def diagonals(planes, p, q, i):
 def first_quad(planes, p, q, work):
     """The quad before the first one of a row."""
     u, v = diagonals(planes, p, q, FIRST - 1)
-    n, work[FIRST - 1 + LENGTH] = unit(cross(u, v))
+    n = cross(u, v)
+    square = known_square(n, u, v, triple(planes, p + FIRST - 1, Y))
+    n, work[FIRST - 1 + LENGTH] = unit(n, square)
     place(work, FIRST - 1 + NORMAL, S, n)
 
 
@@ -84,12 +86,14 @@ def normals(planes, o, p, q, work, g, ring):
         u, v = diagonals(planes, p, q, i)
         place(work, j + U, S, u)
         place(work, j + V, S, v)
-        place(work, j + NORMAL, S, cross(u, v))
+        n, point = cross(u, v), triple(planes, p + i, Y)
+        place(work, j + NORMAL, S, n)
+        work[j + QUAD_SQUARE] = known_square(n, u, v, point)
         if ring:
             a = apart(planes, q + i, planes, o + i, Y)
             b = apart(planes, p + i + 1, planes, p + i - 1, Y)
             n = cross(a, b)
-            work[j + SQUARE] = dot(n, n)
+            work[j + SQUARE] = known_square(n, a, b, point)
             if ring == 2:
                 place(work, j + RING, S, n)
 
@@ -117,7 +121,7 @@ def finite_volume_scales(work):
     """Make normals of quads of length one; scales from the squares of the rings' normals."""
     for j in span(FIRST, FIRST + STRETCH, 4):
         work[j + SCALE] = ring_scale(work[j + SQUARE])
-        n, _ = unit(triple(work, j + NORMAL, S))
+        n, _ = unit(triple(work, j + NORMAL, S), work[j + QUAD_SQUARE])
         place(work, j + NORMAL, S, n)
 
 
@@ -127,7 +131,7 @@ def liu_scales(work, part, g):
     before = Carried((work[FIRST - 1 + LENGTH],))
     for k in span(0, STRETCH, 4):
         i, j = FIRST + g + k + ROW, FIRST + k
-        n, length = unit(triple(work, j + NORMAL, S))
+        n, length = unit(triple(work, j + NORMAL, S), work[j + QUAD_SQUARE])
         place(work, j + NORMAL, S, n)
         both = length + before.get()[0]
         before.set((length,))

@@ -10,6 +10,7 @@ from quadcurv.kernels.formulas import less_half, muladd, where
 
 MAGIC = 0x5FE6EB50C7B537A9  # M. Robertson, A Brief History of InvSqrt, 2012
 LEAST = 2.2250738585072014e-308  # of the numbers whose exponent is not that of zero
+ROUNDING = (32 * 2.0**-52) ** 2
 
 
 def triple(x, i, plane):
@@ -65,6 +66,20 @@ def dot(a, b):
     return muladd(a[0], b[0], muladd(a[1], b[1], a[2] * b[2]))
 
 
+def rounding(edges, far):
+    """Square of a cross product up to which it is zero but for the rounding of its factors and of points.
+
+    `edges` is the sum of the squares of the factors, `far` that of the coordinates of a point beside them.
+    """
+    return ROUNDING * edges * (edges + far)
+
+
+def known_square(n, u, v, point):
+    """Square of n = u x v beside a point, zero where n is but for rounding."""
+    square = dot(n, n)
+    return where(square > rounding(dot(u, u) + dot(v, v), dot(point, point)), square, 0.0)
+
+
 def quotient(x, y):
     """Quotient by a positive y, else NaN."""
     return where(y > 0, x / y, nan)
@@ -89,8 +104,7 @@ def unless_zero(x, square):
     return where(square >= LEAST, x, nan)
 
 
-def unit(n):
-    """A triple over its length, NaN if that is zero, and the length."""
-    square = dot(n, n)
+def unit(n, square):
+    """A triple over its length, NaN if that is zero, and the length; the square of it is known."""
     scale = reciprocal_root(square)
     return times(n, unless_zero(scale, square)), square * scale

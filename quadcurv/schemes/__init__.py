@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Literal
 
 from quadcurv.schemes.base import Curvatures, Diamond, Fit, Laplacian, Scheme, StandardErrors
+from quadcurv.schemes.bilinear import BILINEAR
 from quadcurv.schemes.cotan import cotan
 from quadcurv.schemes.finite_volume import FINITE_VOLUME
 from quadcurv.schemes.fundamental_forms import fundamental_forms
@@ -34,6 +35,7 @@ SCHEMES: dict[str, Scheme] = {
     for scheme in (
         FINITE_VOLUME,
         LIU,
+        BILINEAR,
         cotan(4),
         cotan(6),
         cotan(8),
@@ -53,6 +55,7 @@ SCHEMES: dict[str, Scheme] = {
 SchemeName = Literal[
     "finite_volume",
     "liu",
+    "bilinear",
     "cotan-4",
     "cotan-6",
     "cotan-8",

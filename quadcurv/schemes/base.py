@@ -56,6 +56,11 @@ class Laplacian:
         What a compiled driver needs to know of the scheme.
     symmetric : bool
         Whether S is symmetric on every mesh of quads.
+    checkerboard : bool
+        Whether, beside the constants, S does not see values that alternate like the colours of a
+        chessboard, on meshes of quads whose vertices can be coloured so.
+    polygons : bool
+        Whether polygons of more than four sides are kept; else their triangles are seen.
 
     Examples
     --------
@@ -73,6 +78,8 @@ class Laplacian:
     flux: Callable[[Stencils], tuple[Floats, Floats]] | None = None
     fast: Diamond | None = None
     symmetric: bool = True
+    checkerboard: bool = False
+    polygons: bool = False
 
 
 class StandardErrors(NamedTuple):

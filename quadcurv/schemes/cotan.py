@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-
 import numpy as np
-import scipy
-from numpy.typing import NDArray
 
+from quadcurv.schemes.assembly import flux_from_faces, from_faces
 from quadcurv.schemes.base import Laplacian
-from quadcurv.stencils import Stencils
-from quadcurv.types import Bools, Floats, Ints
+from quadcurv.schemes.triangles import EDGES, half_cotans, squared_distance, voronoi
+from quadcurv.types import Floats
 
 VALENCES = (4, 6, 8)
 AREAS = ("barycentric", "voronoi")
+_THIN = 1e-2  # twice the area over the sum of the squared edges
 
 
 def cotan(valence: int = 6, area: str = "barycentric", diagonal: int = 0) -> Laplacian:
@@ -42,7 +40,12 @@ def cotan(valence: int = 6, area: str = "barycentric", diagonal: int = 0) -> Lap
     Notes
     -----
     With valence 6 the result depends on the vertex that each face begins with: turn a face over as
-    ``face[[0, 3, 2, 1]]`` to keep its diagonal.
+    ``face[[0, 3, 2, 1]]`` to keep its diagonal. Polygons of more than four sides are cut into triangles,
+    the same for every valence.
+
+    libigl computes from the lengths of edges, which loses twice the digits that a thin triangle's height
+    does: cotans of triangles whose area is less than a hundredth of their squared edges are computed from
+    coordinates instead.
 
     Examples
     --------
@@ -59,90 +62,50 @@ def cotan(valence: int = 6, area: str = "barycentric", diagonal: int = 0) -> Lap
             raise ValueError(f"{name}: expected one of {allowed}, got {value!r}")
     if diagonal and valence != 6:
         raise ValueError(f"diagonal: only valence 6 has a choice of diagonals, got valence {valence}")
+    # Cuts by the corner of the quad that they cut off, and those of its corners whose rows they give.
+    corners, given = {
+        4: (range(4), [1]),
+        6: ((0, 2) if diagonal else (1, 3), [0, 1, 2]),
+        8: (range(4), [0, 2]),
+    }[valence]
 
-    def assemble(stencils: Stencils) -> tuple[scipy.sparse.csr_array, Floats]:
-        p, n = len(stencils.points), stencils.n
-        stiffness, areas = scipy.sparse.csr_array((n, p)), np.zeros(n)
-        for triangles, served in _triangulations(stencils, valence, diagonal):
-            S, A = cotan_matrices(stencils.points, triangles, area)
-            if served.all():
-                return S[:n], A[:n]
-            rows = np.flatnonzero(served)
-            place = scipy.sparse.csr_array((np.ones(rows.size), (rows, np.arange(rows.size))), (n, rows.size))
-            stiffness = stiffness + place @ S[rows]
-            areas[served] = A[:n][served]
-        return stiffness, areas
-
-    def flux(stencils: Stencils) -> tuple[Floats, Floats]:
-        n = stencils.n
-        into, areas = np.zeros((n, 3)), np.zeros(n)
-        # Relative to one of the points: rows sum to zero, but only up to the rounding of their weights.
-        x = stencils.points - stencils.points[0]
-        for triangles, served in _triangulations(stencils, valence, diagonal):
-            S, A = cotan_matrices(stencils.points, triangles, area)
-            into[served] = -(S @ x)[:n][served]
-            areas[served] = A[:n][served]
-        return into, areas
+    def local(x: Floats) -> tuple[Floats, Floats]:
+        if x.shape[1] == 3:
+            return _by_libigl(x, area)
+        matrices, parts = np.zeros((len(x), 4, 4)), np.zeros((len(x), 4))
+        for s in corners:
+            triangle = np.array([s - 1, s, s + 1]) % 4
+            K, third = _by_libigl(x[:, triangle], area)
+            matrices[:, triangle[given, None], triangle] += K[:, given]
+            parts[:, triangle[given]] += third[:, given]
+        return matrices, parts
 
     name = f"cotan-{valence}" + ("'" if diagonal else "") + ("-voronoi" if area == "voronoi" else "")
     reference = "Meyer et al. 2003, eq. 8 (thesis, eq. 4.3), by libigl"
-    return Laplacian(name, 2 if valence == 6 else 0, reference, assemble, flux, symmetric=valence == 6)
-
-
-def cotan_matrices(points: Floats, triangles: Ints, area: str) -> tuple[scipy.sparse.csr_array, Floats]:
-    """Positive semi-definite (p, p) cotan stiffness and (p,) dual areas, from libigl."""
-    import igl
-
-    kind = igl.MASSMATRIX_TYPE_VORONOI if area == "voronoi" else igl.MASSMATRIX_TYPE_BARYCENTRIC
-    faces = np.ascontiguousarray(triangles, dtype=np.int64)
-    stiffness = scipy.sparse.csr_array(-igl.cotmatrix(points, faces))
-    areas = igl.massmatrix(points, faces, kind).diagonal()
-    return stiffness, np.pad(areas, (0, len(points) - areas.size))  # libigl ends at the last vertex used
-
-
-def _triangulations(
-    stencils: Stencils, valence: int, diagonal: int
-) -> Iterator[tuple[NDArray[np.int32], Bools]]:
-    """Triangles, and which of the n vertices they are the right ones for; together these are all."""
-    faces = stencils.faces
-    if valence == 6:
-        yield _cut(faces, np.full(len(faces), bool(diagonal))), np.ones(stencils.n, bool)
-        return
-    colours = _colours(stencils)
-    for k in range(colours.max() + 1):
-        corner = (colours == k)[faces] & (faces >= 0)
-        along_second = corner[:, [0, 2]].any(axis=1)  # the diagonal that passes across slots 0 and 2
-        if valence == 8:
-            along_second = corner[:, [1, 3]].any(axis=1)
-        yield (
-            _cut(faces[corner.any(axis=1)], along_second[corner.any(axis=1)]),
-            colours[: stencils.n] == k,
-        )
-
-
-def _cut(faces: Ints, along_second: Bools) -> Ints:
-    """Triangles of the quads cut along their first or second diagonal, and of the triangles as they are."""
-    quad = faces[:, 3] >= 0
-    first = faces[quad & ~along_second]
-    second = faces[quad & along_second]
-    return np.concatenate(
-        (
-            faces[~quad, :3],
-            first[:, [0, 1, 2]],
-            first[:, [2, 3, 0]],
-            second[:, [1, 2, 3]],
-            second[:, [3, 0, 1]],
-        )
+    return Laplacian(
+        name,
+        2 if valence == 6 else 0,
+        reference,
+        from_faces(local),
+        flux_from_faces(local),
+        symmetric=valence == 6,
     )
 
 
-def _colours(stencils: Stencils) -> NDArray[np.int64]:
-    """Colour the n vertices so that no quad's edge joins two alike; -1 for ghosts and dual points.
+def _by_libigl(x: Floats, area: str) -> tuple[Floats, Floats]:
+    """Stiffness (m, 3, 3) and dual areas (m, 3) of triangles (m, 3, 3), no two of which share a vertex."""
+    import igl
 
-    Vertices of one colour can all have their quads cut at once: two passes on most quad meshes.
-    """
-    from quadcurv.kernels import topology
-
-    p = len(stencils.points)
-    indptr, corners = topology.corners_by_vertex(stencils.faces, p)
-    return topology.colour(stencils.faces, indptr, corners, stencils.n)
+    # Relative to a corner, so that an offset of the whole mesh costs no digits.
+    points = np.ascontiguousarray(x - x[:, :1]).reshape(-1, 3)
+    triangles = np.arange(len(points)).reshape(-1, 3)
+    kind = igl.MASSMATRIX_TYPE_VORONOI if area == "voronoi" else igl.MASSMATRIX_TYPE_BARYCENTRIC
+    weights = igl.cotmatrix_entries(points, triangles)  # halves of cotans, by the edge across from a corner
+    parts = igl.massmatrix(points, triangles, kind).diagonal().reshape(-1, 3)
+    # The sum of the squared edges is twice that of the cotans times twice the area.
+    thin = np.flatnonzero(~(4 * weights.sum(axis=1) < 1 / _THIN))
+    if thin.size:
+        own, double = half_cotans(*x[thin].transpose(1, 2, 0), squared_distance(x[thin]))
+        weights[thin] = own.T
+        parts[thin] = voronoi(own, double).T if area == "voronoi" else double[:, None] / 6
+    return np.tensordot(weights, EDGES, 1), parts

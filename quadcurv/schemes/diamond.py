@@ -3,34 +3,23 @@
 from __future__ import annotations
 
 import numpy as np
-import scipy
 
-from quadcurv.stencils import Stencils
-from quadcurv.types import Floats, Ints
+from quadcurv.schemes.triangles import cross, dot, length, squared_distance
+from quadcurv.types import Floats
 
-# Of one vertex of a face list and of one row of a matrix, in vertices of a grid.
-_RING_WORK, _ROW_WORK = 4, 8
-
-# Diagonals (u, v) of a quad from its four vertices.
-_B = np.array([[-1.0, 0.0, 1.0, 0.0], [0.0, -1.0, 0.0, 1.0]])
+# Diagonals of a quad from its corners; their squares and product in the stiffness.
+_B = np.array([(-1.0, 0.0, 1.0, 0.0), (0.0, -1.0, 0.0, 1.0)])
+_FORMS = np.einsum("ai,bj->abij", _B, _B)
 
 
-def local_stiffness(points: Floats, quads: Ints) -> Floats:
-    """(m, 4, 4) stiffness of each quad, not finite for one without area."""
-    from quadcurv.kernels import faces
+def diamond(x: Floats, far: Floats | None = None) -> tuple[Floats, Floats]:
+    """Stiffness (m, 4, 4) of quads (m, 4, 3), and a quarter of the area of each at its corners (m, 4).
 
-    with np.errstate(invalid="ignore"):
-        return np.einsum("ai,mab,bj->mij", _B, faces.conductances(points, quads), _B, optimize=True)
-
-
-def scatter(local: Floats, rows: Ints, columns: Ints, shape: tuple[int, int]) -> scipy.sparse.csr_array:
-    """Sum local matrices (m, i, j) with vertices rows (m, i) and columns (m, j) into one."""
-    i, j = np.broadcast_arrays(rows[:, :, None], columns[:, None, :])
-    return scipy.sparse.csr_array((local.ravel(), (i.ravel(), j.ravel())), shape=shape)
-
-
-def quad_stiffness(stencils: Stencils) -> scipy.sparse.csr_array:
-    """(p, p) stiffness of all quads, triangles left out."""
-    p = len(stencils.points)
-    quads = stencils.faces[stencils.faces[:, 3] >= 0]
-    return scatter(local_stiffness(stencils.points, quads), quads, quads, (p, p))
+    `far` is their squared distance from the origin, where `x` is relative to some other point.
+    """
+    far = squared_distance(x) if far is None else far
+    u, v = (x[:, 2] - x[:, 0]).T, (x[:, 3] - x[:, 1]).T
+    uu, uv, vv = dot(u, u), dot(u, v), dot(v, v)
+    double = length(cross(u, v), uu + vv, far)
+    K = np.array([(vv, -uv), (-uv, uu)]) / (2 * double)
+    return np.tensordot(K, _FORMS, ((0, 1), (0, 1))), np.repeat(double[:, None] / 8, 4, axis=1)

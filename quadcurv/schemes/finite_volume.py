@@ -5,8 +5,10 @@ from __future__ import annotations
 import numpy as np
 import scipy
 
+from quadcurv.schemes.assembly import assembled
 from quadcurv.schemes.base import Diamond, Laplacian
-from quadcurv.schemes.diamond import local_stiffness, quad_stiffness, scatter
+from quadcurv.schemes.diamond import diamond
+from quadcurv.schemes.triangles import squared_distance
 from quadcurv.stencils import Stencils, face_pairs
 from quadcurv.types import Floats, Ints
 
@@ -61,23 +63,21 @@ def _flux(stencils: Stencils) -> tuple[Floats, Floats]:
     faces.quad_fluxes(stencils.points, stencils.faces, flux, unused)
     if stencils.has_triangles:
         corners, _, points = _flap_points(stencils)
-        faces.flap_fluxes(points, corners, flux)
+        faces.flap_fluxes(points, corners, stencils.points[0], flux)
     return flux[: stencils.n], _dual_areas(stencils)
 
 
-def _rows(stencils: Stencils) -> scipy.sparse.csr_array:
-    S = quad_stiffness(stencils)
+def _assemble(stencils: Stencils) -> tuple[scipy.sparse.csr_array, Floats]:
+    n, p = stencils.n, len(stencils.points)
+    S, _ = assembled(stencils.points, [stencils.faces[stencils.faces[:, 3] >= 0]], diamond, n)
     if stencils.has_triangles:
         corners, place, points = _flap_points(stencils)
-        p = len(stencils.points)
-        row = local_stiffness(points, corners)[:, :1]
-        flaps = scatter(row, corners[:, :1], corners, (p, len(points)))
+        far = squared_distance(stencils.points[corners[:, :1]])
+        row = diamond(points[corners], far)[0][:, 0]
+        where = np.repeat(corners[:, 0], 4), corners.ravel()
+        flaps = scipy.sparse.csr_array((row.ravel(), where), (p, len(points)))[:n]
         S = S + flaps[:, :p] + flaps[:, p:] @ place
-    return S
-
-
-def _assemble(stencils: Stencils) -> tuple[scipy.sparse.csr_array, Floats]:
-    return _rows(stencils)[: stencils.n], _dual_areas(stencils)
+    return S, _dual_areas(stencils)
 
 
 FINITE_VOLUME = Laplacian(
@@ -87,4 +87,5 @@ FINITE_VOLUME = Laplacian(
     _assemble,
     _flux,
     Diamond("ring"),
+    checkerboard=True,
 )

@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 import numpy as np
-import scipy
 
+from quadcurv.schemes.assembly import from_faces
 from quadcurv.schemes.base import Diamond, Laplacian
-from quadcurv.schemes.cotan import cotan_matrices
-from quadcurv.schemes.diamond import quad_stiffness
+from quadcurv.schemes.diamond import diamond
+from quadcurv.schemes.triangles import linear
 from quadcurv.stencils import Stencils
 from quadcurv.types import Floats
+
+
+def _local(x: Floats) -> tuple[Floats, Floats]:
+    return linear(x) if x.shape[1] == 3 else diamond(x)
 
 
 def _flux(stencils: Stencils) -> tuple[Floats, Floats]:
@@ -22,23 +26,13 @@ def _flux(stencils: Stencils) -> tuple[Floats, Floats]:
     return flux[: stencils.n], area[: stencils.n]
 
 
-def _rows(stencils: Stencils) -> scipy.sparse.csr_array:
-    S = quad_stiffness(stencils)
-    if stencils.has_triangles:
-        triangles = stencils.faces[stencils.faces[:, 3] < 0, :3]
-        S = S + cotan_matrices(stencils.points, triangles, "barycentric")[0]
-    return S
-
-
-def _assemble(stencils: Stencils) -> tuple[scipy.sparse.csr_array, Floats]:
-    return _rows(stencils)[: stencils.n], _flux(stencils)[1]
-
-
+# Polygons of more than four sides are cut into triangles.
 LIU = Laplacian(
     "liu",
     2,
     "Liu, Xu and Zhang 2008, eq. 2.4 and 2.10 (thesis, eq. 4.4-4.7)",
-    _assemble,
+    from_faces(_local),
     _flux,
     Diamond("quads"),
+    checkerboard=True,
 )

@@ -1,19 +1,27 @@
-"""Laplacians of polygons: of virtual triangles (Bunge et al.), and by discrete exterior calculus."""
+"""Laplacians of polygons: of virtual triangles (Bunge et al.), and by discrete exterior calculus.
+
+Faces of more than four sides are kept as they are, up to ``assembly.MOST_SIDES`` of these.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 import numpy as np
-import scipy
 
+from quadcurv.schemes.assembly import Local, flux_from_faces, from_faces
 from quadcurv.schemes.base import Laplacian
-from quadcurv.schemes.diamond import scatter
-from quadcurv.stencils import Stencils
+from quadcurv.schemes.triangles import (
+    cross,
+    cut_up,
+    dot,
+    half_cotans,
+    length,
+    linear,
+    squared_distance,
+    voronoi,
+)
 from quadcurv.types import Floats
 
-# Corners (m, k, 3) of polygons of k sides -> their stiffness (m, k, k) and parts of the dual areas (m, k).
-Local = Callable[[Floats], tuple[Floats, Floats]]
+_PLANAR = 1e-9  # heights of corners over their distances, of a polygon that is taken to be planar
 
 
 def bunge() -> Laplacian:
@@ -23,7 +31,8 @@ def bunge() -> Laplacian:
     combination of the corners with the smallest weights, so that the matrix has none but the mesh's own
     vertices. On a triangle this is the cotan formula. The weights say how a quad differs from a planar one:
     on nearly planar quads they are sensitive to rounding. The dual area is the mixed Voronoi area of the
-    fans, as in libigl.
+    fans, as in libigl. Polygons of more than four sides are kept, those of more than 128 cut into triangles,
+    as are faces so far from convex that a triangle of the fan turns over.
 
     Returns
     -------
@@ -42,35 +51,43 @@ def bunge() -> Laplacian:
     """
 
     def local(x: Floats) -> tuple[Floats, Floats]:
-        m, k, _ = x.shape
-        arm = x - x.mean(axis=1, keepdims=True)
-        next_arm = np.roll(arm, -1, axis=1)
-        edge = next_arm - arm
-        # Triangles arm x next - virtual x edge: the sum of their squares is least where its gradient is 0.
-        cross = (
-            np.einsum("mkx,mkx->m", edge, edge)[:, None, None] * np.eye(3) - np.swapaxes(edge, 1, 2) @ edge
+        arm, _ = _in_plane(x)
+        _, k, m = arm.shape
+        if k == 3:
+            virtual, weights = np.zeros((3, m)), np.full((3, m), 1 / 3)
+        else:
+            virtual = _virtual_vertex(arm)
+            weights = 1 / k + _least_weights(arm, virtual)
+        halves, double = half_cotans(
+            arm, np.roll(arm, -1, axis=1), np.broadcast_to(virtual[:, None], arm.shape), squared_distance(x)
         )
-        torque = np.cross(edge, np.cross(arm, next_arm)).sum(axis=1)
-        virtual = np.linalg.pinv(cross, hermitian=True) @ torque[:, :, None]
-        weights = 1 / k + (np.swapaxes(np.linalg.pinv(arm, rcond=1e-9), 1, 2) @ virtual)[:, :, 0]
-
-        fan = np.stack((arm, next_arm, np.broadcast_to(np.swapaxes(virtual, 1, 2), arm.shape)), axis=2)
-        across = np.roll(fan, 1, axis=2) - np.roll(fan, -1, axis=2)  # (m, k, 3, 3): edge across from a corner
-        double = np.linalg.norm(np.cross(across[:, :, 0], across[:, :, 1]), axis=-1)
-        cotan = across @ np.swapaxes(across, 2, 3) / (2 * double[:, :, None, None])
-        # From the fan's corners, triangle by triangle, to those of the polygon.
-        own = np.eye(k)
-        spread = np.empty((m, k, 3, k))
-        spread[:, :, 0], spread[:, :, 1] = own, np.roll(own, 1, axis=1)
-        spread[:, :, 2] = weights[:, None]
-        stiffness = np.einsum("mtia,mtij,mtjb->mab", spread, cotan, spread, optimize=True)
-        return stiffness, np.einsum("mti,mtia->ma", _voronoi(across, double), spread)
+        own, following, middle = voronoi(halves, double)
+        parts = own + np.roll(following, 1, axis=0) + weights * middle.sum(axis=0)
+        if k == 3:
+            return linear(x)[0], parts.T
+        # Weights of the edges to the virtual vertex, those of the sides, and the virtual vertex left out.
+        spoke, side = halves[1] + np.roll(halves[0], 1, axis=0), halves[2]
+        mixed = (spoke.sum(axis=0) / 2 * weights - spoke) * weights[:, None]
+        matrices = mixed + mixed.swapaxes(0, 1)
+        i, j = np.arange(k), (np.arange(k) + 1) % k
+        matrices[i, i] += spoke + side + np.roll(side, 1, axis=0)
+        matrices[i, j] -= side
+        matrices[j, i] -= side
+        matrices, parts = matrices.T, parts.T
+        # Where the virtual vertex does not see all sides from within, triangles would overlap.
+        spokes = arm - virtual[:, None]
+        over = np.flatnonzero((cross(spokes, np.roll(spokes, -1, axis=1))[2] <= 0).any(axis=0))
+        if over.size:
+            matrices[over], parts[over] = cut_up(x[over], voronoi)
+        return matrices, parts
 
     return _scheme("bunge", "Bunge, Herholz, Kazhdan and Botsch 2020", local)
 
 
 def de_goes(stabilisation: float = 1.0) -> Laplacian:
     """Laplacian of de Goes, Butts and Desbrun (2020): gradients and 1-forms of polygons.
+
+    Polygons of more than four sides are kept, those of more than 128 cut into triangles.
 
     Parameters
     ----------
@@ -100,19 +117,22 @@ def de_goes(stabilisation: float = 1.0) -> Laplacian:
     _checked(stabilisation)
 
     def local(x: Floats) -> tuple[Floats, Floats]:
-        edge, middle, normal, area = _polygon(x)
-        flat = edge - np.einsum("mkx,mx,my->mky", edge, normal, normal)
-        arm = middle - x.mean(axis=1, keepdims=True)
-        sharp = np.cross(normal[:, None], arm) / area[:, None, None]  # (m, k, 3), transposed
-        rest = np.eye(x.shape[1]) - flat @ np.swapaxes(sharp, 1, 2)
-        inner = area[:, None, None] * sharp @ np.swapaxes(sharp, 1, 2)
-        return _laplacian(inner + stabilisation * np.swapaxes(rest, 1, 2) @ rest, area)
+        if x.shape[1] == 3:
+            return linear(x)
+        arm, area = _in_plane(x)
+        edge, middle = _edges(arm)
+        sharp = np.stack((-middle[1], middle[0])) / area
+        rest = np.eye(x.shape[1])[..., None] - np.einsum("xim,xjm->ijm", edge[:2], sharp)
+        inner = np.einsum("xim,xjm->ijm", area * sharp, sharp)
+        return _laplacian(inner + stabilisation * np.einsum("jim,jkm->ikm", rest, rest), area)
 
     return _scheme("de_goes", "de Goes, Butts and Desbrun 2020", local)
 
 
 def alexa_wardetzky(stabilisation: float = 1.0) -> Laplacian:
     """Laplacian of Alexa and Wardetzky (2011): that of the largest projection of a polygon.
+
+    Polygons of more than four sides are kept, those of more than 128 cut into triangles.
 
     Parameters
     ----------
@@ -142,15 +162,13 @@ def alexa_wardetzky(stabilisation: float = 1.0) -> Laplacian:
     _checked(stabilisation)
 
     def local(x: Floats) -> tuple[Floats, Floats]:
-        edge, middle, normal, area = _polygon(x)
-        flat = edge - np.einsum("mkx,mx,my->mky", edge, normal, normal)
-        middle = middle - x.mean(axis=1, keepdims=True)
-        metric = np.swapaxes(flat, 1, 2) @ flat + np.einsum("m,mx,my->mxy", area, normal, normal)
-        # Diagonals in parallel but for rounding: the quad has no plane.
-        metric[~(area > 1e-14 * np.einsum("mkx,mkx->m", edge, edge))] = np.nan
-        span = flat @ np.linalg.inv(metric) @ np.swapaxes(flat, 1, 2)  # onto what the projected edges span
-        rest = np.eye(x.shape[1]) - span
-        inner = middle @ np.swapaxes(middle, 1, 2) / area[:, None, None]
+        if x.shape[1] == 3:
+            return linear(x)
+        arm, area = _in_plane(x)
+        edge, middle = _edges(arm)
+        seen = _orthonormal(edge[:2])  # what the projected edges span
+        rest = np.eye(x.shape[1])[..., None] - np.einsum("xim,xjm->ijm", seen, seen)
+        inner = np.einsum("xim,xjm->ijm", middle, middle) / area
         return _laplacian(inner + stabilisation * rest, area)
 
     return _scheme("alexa_wardetzky", "Alexa and Wardetzky 2011", local)
@@ -162,46 +180,74 @@ def _checked(stabilisation: float) -> None:
 
 
 def _scheme(name: str, reference: str, local: Local) -> Laplacian:
-    def assemble(stencils: Stencils) -> tuple[scipy.sparse.csr_array, Floats]:
-        p = len(stencils.points)
-        stiffness, areas = scipy.sparse.csr_array((p, p)), np.zeros(p)
-        triangle = stencils.faces[:, 3] < 0
-        for faces in (stencils.faces[triangle, :3], stencils.faces[~triangle]):
-            # Relative to a corner, so that an offset of the whole mesh costs no digits.
-            x = stencils.points[faces] - stencils.points[faces[:, :1]]
-            with np.errstate(all="ignore"):  # a face without area: NaN at its corners
-                matrices, parts = local(x)
-            stiffness = stiffness + scatter(matrices, faces, faces, (p, p))
-            np.add.at(areas, faces, parts)
-        return stiffness[: stencils.n], areas[: stencils.n]
-
-    return Laplacian(name, 2, reference, assemble)
+    assemble, flux = from_faces(local, polygons=True), flux_from_faces(local, polygons=True)
+    return Laplacian(name, 2, reference, assemble, flux, polygons=True)
 
 
-def _voronoi(across: Floats, double: Floats) -> Floats:
-    """Mixed Voronoi areas (..., 3) of triangles (Meyer et al. 2003) with edges `across` from each corner."""
-    before, after = np.roll(across, 1, axis=-2), np.roll(across, -1, axis=-2)
-    cosine = -np.einsum("...x,...x->...", before, after)  # at the corner, times both lengths
-    square = np.einsum("...x,...x->...", across, across)
-    share = cosine * square / double[..., None]
-    # Half of each neighbouring edge's share; of an obtuse triangle, half for that corner.
-    acute = (share.sum(axis=-1, keepdims=True) - share) / 8
-    area = double[..., None] / 2
-    obtuse = np.where(cosine < 0, area / 2, area / 4)
-    return np.where((cosine < 0).any(axis=-1, keepdims=True), obtuse, acute)
+def _in_plane(x: Floats) -> tuple[Floats, Floats]:
+    """Corners (3, k, m) of faces (m, k, 3) relative to their mean, and their areas (m,), NaN without one.
+
+    The area is that of the largest projection, across the vector area. The last coordinate is that along the
+    vector area, the first along the longest edge across it: thin polygons keep the digits of their width.
+    """
+    arm = (x - x[:, :1]).T.copy()
+    arm -= arm.mean(axis=1, keepdims=True)
+    edge, _ = _edges(arm)
+    vector = cross(arm, edge).sum(axis=1)
+    double = length(vector, dot(edge, edge).sum(axis=0), squared_distance(x))
+    normal = vector / double
+    flat = edge - normal[:, None] * dot(edge, normal[:, None])
+    square = dot(flat, flat)
+    longest = square.argmax(axis=0)[None]
+    along = np.take_along_axis(flat, longest[None], axis=1)[:, 0]
+    along /= np.sqrt(np.take_along_axis(square, longest, axis=0)[0])
+    axes = np.stack((along, cross(normal, along), normal))
+    return np.einsum("xym,yim->xim", axes, arm), double / 2
 
 
-def _polygon(x: Floats) -> tuple[Floats, Floats, Floats, Floats]:
-    """Edges and their middles (m, k, 3), unit normals (m, 3) and areas (m,), those of the vector area."""
-    following = np.roll(x, -1, axis=1)
-    arm = x - x.mean(axis=1, keepdims=True)
-    vector = np.cross(arm, np.roll(arm, -1, axis=1)).sum(axis=1) / 2
-    area = np.linalg.norm(vector, axis=1)
-    return following - x, (following + x) / 2, vector / area[:, None], area
+def _edges(arm: Floats) -> tuple[Floats, Floats]:
+    """Edges and their middles (3, k, m)."""
+    after = np.roll(arm, -1, axis=1)
+    return after - arm, (after + arm) / 2
+
+
+def _virtual_vertex(arm: Floats) -> Floats:
+    """Point p (3, m) with the least sum of squared areas arm x next arm - p x edge of its triangles."""
+    edge, _ = _edges(arm)
+    # The gradient is 0 where (|edge|^2 - edge edge^T) p = edge x (arm x edge), summed.
+    system = -np.einsum("xim,yim->xym", edge, edge)
+    square = -np.einsum("xxm->xm", system)
+    system[range(3), range(3)] = square[[1, 2, 0]] + square[[2, 0, 1]]
+    torque = cross(edge, cross(arm, edge)).sum(axis=1)
+    scale = 1 / np.sqrt(np.einsum("xxm->xm", system))  # rows of a thin polygon differ by its aspect's square
+    system = system * scale * scale[:, None]
+    minors = np.stack([cross(system[i - 2], system[i - 1]) for i in range(3)])
+    return scale * dot(minors, (scale * torque)[:, None]) / dot(system[0], minors[0])
+
+
+def _least_weights(arm: Floats, virtual: Floats) -> Floats:
+    """Smallest numbers (k, m) of sum 0 by which the corners add up to the virtual vertex (3, m)."""
+    weights = np.zeros(arm.shape[1:])
+    size = np.sqrt(dot(arm, arm).sum(axis=0))
+    for column, unit, wanted, least in zip(arm, _orthonormal(arm), virtual, (0, 0, _PLANAR), strict=True):
+        share = dot(column, unit)
+        more = (wanted - dot(column, weights)) / share * unit
+        weights += np.where(share > least * size, more, 0.0)
+    return weights
+
+
+def _orthonormal(columns: Floats) -> Floats:
+    """Gram and Schmidt's orthonormal vectors (c, k, m) from columns, NaN where nothing is left of one."""
+    basis = np.empty_like(columns)
+    for i, column in enumerate(columns):
+        for unit in (*basis[:i], *basis[:i]):  # twice is enough
+            column = column - dot(column, unit) * unit
+        basis[i] = column / np.sqrt(dot(column, column))
+    return basis
 
 
 def _laplacian(inner: Floats, area: Floats) -> tuple[Floats, Floats]:
     """d^T M d with d the difference along each edge; equal parts of the area."""
-    half = np.roll(inner, 1, axis=2) - inner
-    k = inner.shape[1]
-    return np.roll(half, 1, axis=1) - half, np.repeat(area[:, None] / k, k, axis=1)
+    half = np.roll(inner, 1, axis=1) - inner
+    k = len(inner)
+    return (np.roll(half, 1, axis=0) - half).T, np.repeat(area[:, None] / k, k, axis=1)

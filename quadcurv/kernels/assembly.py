@@ -1,0 +1,94 @@
+"""Matrices over faces put together: the pattern of the sum once, then values into their places."""
+
+import numpy as np
+
+from quadcurv.kernels.compiled import flat, kernel
+
+
+@kernel
+def _pattern(first, corners, n, p):
+    start = np.zeros(p + 2, np.int64)
+    for c in range(corners.size):
+        start[corners[c] + 2] += 1
+    for w in range(p):
+        start[w + 2] += start[w + 1]
+    around = np.empty(corners.size, np.int32)  # faces, vertex by vertex
+    for f in range(first.size - 1):
+        for c in range(first[f], first[f + 1]):
+            w = corners[c] + 1
+            around[start[w]] = f
+            start[w] += 1
+    indptr = np.zeros(n + 1, np.int64)
+    indices = np.empty(0, np.int32)
+    for turn in range(2):  # count, then write
+        last = np.full(n, -1, np.int32)
+        for w in range(p):
+            for k in range(start[w], start[w + 1]):
+                for c in range(first[around[k]], first[around[k] + 1]):
+                    v = corners[c]
+                    if v < n and last[v] != w:
+                        last[v] = w
+                        if turn == 1:
+                            indices[indptr[v]] = w
+                            indptr[v] += 1
+                        else:
+                            indptr[v + 1] += 1
+        if turn == 0:
+            for v in range(n):
+                indptr[v + 1] += indptr[v]
+            indices = np.empty(indptr[n], np.int32)
+    for v in range(n, 0, -1):
+        indptr[v] = indptr[v - 1]
+    indptr[0] = 0
+    return indptr, indices
+
+
+def pattern(first, corners, n, p):
+    """CSR pattern of rows 0..n of a sum of matrices over faces: indptr (n + 1,) int64, indices int32.
+
+    Face f has the vertices ``corners[first[f]:first[f + 1]]``, all less than p. Columns come out sorted: they
+    are gone through in their order, each being appended to the rows that it stands in.
+    """
+    return _pattern(flat(first), flat(corners), n, p)
+
+
+@kernel
+def _add(matrices, faces, sides, indptr, indices, data):
+    n = indptr.size - 1
+    for c in range(faces.size):
+        v, first = faces[c], c - c % sides
+        if v >= n:
+            continue
+        for j in range(sides):
+            low, high = indptr[v], indptr[v + 1]
+            while high - low > 1:
+                middle = (low + high) >> 1
+                if indices[middle] <= faces[first + j]:
+                    low = middle
+                else:
+                    high = middle
+            data[low] += matrices[c * sides + j]
+
+
+def add(matrices, faces, indptr, indices, data):
+    """Add matrices (m, k, k) over faces (m, k) to the data of a CSR matrix, rows beyond its last left out."""
+    _add(flat(matrices), flat(faces), faces.shape[1], flat(indptr), flat(indices), data)
+
+
+@kernel
+def _add_fluxes(matrices, points, faces, sides, flux):
+    n = flux.size // 3
+    for c in range(faces.size):
+        v, first = faces[c], c - c % sides
+        if v >= n:
+            continue
+        for j in range(sides):
+            for x in range(3):
+                # Relative to the vertex itself: rows sum to zero, but only up to rounding.
+                along = points[3 * faces[first + j] + x] - points[3 * v + x]
+                flux[3 * v + x] -= matrices[c * sides + j] * along
+
+
+def add_fluxes(matrices, points, faces, flux):
+    """Add -K x, K being matrices (m, k, k) over faces (m, k), to flux (n, 3), vertices from n on left out."""
+    _add_fluxes(flat(matrices), flat(points), flat(faces), faces.shape[1], flux.reshape(-1))

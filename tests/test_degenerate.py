@@ -1,0 +1,223 @@
+"""Faces, halves of faces and rings without area but for rounding: right, or NaN there, never an error."""
+
+from __future__ import annotations
+
+import warnings
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+import quadcurv as qc
+from quadcurv import surfaces
+from quadcurv.schemes import SCHEMES, Laplacian
+
+LAPLACIANS = {name: scheme for name, scheme in SCHEMES.items() if isinstance(scheme, Laplacian)}
+each = pytest.mark.parametrize("scheme", SCHEMES.values(), ids=SCHEMES)
+each_laplacian = pytest.mark.parametrize("scheme", LAPLACIANS.values(), ids=LAPLACIANS)
+# On triangles these are all the cotan formula; the finite-volume scheme reads the triangles beside too.
+COTAN = [name for name in LAPLACIANS if name != "finite_volume"]
+PLACES = [(1.0, 0.0), (1e-6, 0.0), (1e6, 0.0), (1.0, 1e3), (1.0, 1e6), (1e-3, 1e6)]  # scale, offset
+
+
+def turn(seed):
+    return Rotation.random(rng=np.random.default_rng(seed)).as_matrix().T
+
+
+# ---- needles and caps -----------------------------------------------------------------------------------
+
+
+def with_thin_triangle(kind, size, seed=0):
+    """An ellipsoid of triangles, one of them divided from a point near a corner of it, or near a side."""
+    mesh = surfaces.cubed_ellipsoid().sample((4, 4), "faces")[0]
+    triangles = np.concatenate((mesh.faces[:, [0, 1, 2]], mesh.faces[:, [2, 3, 0]]))
+    points = mesh.points @ turn(seed)
+    corners = triangles[20]
+    a, b, c = points[corners]
+    along, up = b - a, c - a
+    if kind == "needle":
+        new = a + size * (0.3 * along + 0.7 * up) / np.linalg.norm(along)
+    else:
+        up = up - (up @ along) / (along @ along) * along
+        new = 0.45 * a + 0.55 * b + size * up / np.linalg.norm(up)
+    v = len(points)
+    fan = [[corners[i - 1], corners[i], v] for i in range(3)]
+    return np.vstack((points, new)), np.concatenate((np.delete(triangles, 20, axis=0), fan))
+
+
+def cotan_in_long_doubles(points, triangles):
+    """Stiffness and a third of the triangles' areas, relative to these very positions."""
+    x = points.astype(np.longdouble)
+    S, A = np.zeros((len(x), len(x)), np.longdouble), np.zeros(len(x), np.longdouble)
+    for t in triangles:
+        double = np.sqrt((np.cross(x[t[1]] - x[t[0]], x[t[2]] - x[t[0]]) ** 2).sum())
+        for i in range(3):
+            c, a, b = t[i], t[i - 2], t[i - 1]
+            half = ((x[a] - x[c]) * (x[b] - x[c])).sum() / (2 * double)
+            S[[a, b], [b, a]] -= half
+            S[[a, b], [a, b]] += half
+            A[c] += double / 6
+    return S, A
+
+
+@pytest.mark.parametrize("scheme", COTAN)
+@pytest.mark.parametrize("kind", ["needle", "cap"])
+@pytest.mark.parametrize("size", [1e-3, 1e-6, 1e-8, 1e-9, 1e-10, 1e-12])
+def test_thin_triangles_are_as_exact_as_their_positions(scheme, kind, size):
+    points, triangles = with_thin_triangle(kind, size)
+    S, A = cotan_in_long_doubles(points, triangles)
+    found = qc.stiffness_matrix((points, triangles), scheme).toarray()
+    scale = np.sqrt(np.outer(np.diag(S), np.diag(S)))
+    rounding = 2.0**-52 / size
+    assert (np.abs(found - S) / scale).max() < 1e-11 + 10 * rounding
+    Hn = qc.mean_curvature_normal((points, triangles), scheme)
+    assert np.isfinite(Hn).all()
+    if np.allclose(qc.dual_areas((points, triangles), scheme), A.astype(float), rtol=1e-9):
+        expected = -(S @ points.astype(np.longdouble)) / (2 * A[:, None])
+        assert np.linalg.norm(Hn - expected, axis=1).max() < (1e-11 + 10 * rounding) * np.abs(expected).max()
+
+
+@each_laplacian
+@pytest.mark.parametrize("kind", ["needle", "cap"])
+@pytest.mark.parametrize("size", [1e-5, 1e-7, 1e-9, 1e-11, 1e-13, 1e-14, 1e-15, 1e-17, 0.0])
+def test_thinner_ones_are_nan_at_the_triangle_alone(scheme, kind, size):
+    points, triangles = with_thin_triangle(kind, size, seed=3)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        H = qc.mean_curvature((points, triangles), scheme)
+    missing = np.flatnonzero(np.isnan(H))
+    assert set(missing) <= set(np.unique(triangles[-3:]))
+    if size >= 1e-12:
+        assert missing.size == 0
+    elif size <= 1e-15 and scheme.name != "finite_volume":  # which looks across a triangle without area
+        assert missing.size >= 3
+    right = qc.mean_curvature(with_thin_triangle(kind, 1e-5, seed=3), scheme)
+    assert np.nanmax(np.abs(H) * dual(points, triangles)) < 2 * np.nanmax(
+        np.abs(right) * dual(points, triangles)
+    )
+
+
+def dual(points, triangles):
+    return qc.dual_areas((points, triangles), "liu")
+
+
+@pytest.mark.parametrize("kind", ["needle", "cap"])
+@pytest.mark.parametrize("size", [1e-7, 1e-9, 1e-12, 1e-14, 1e-16, 0.0])
+def test_compare_survives(kind, size):
+    points, triangles = with_thin_triangle(kind, size)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        found = qc.compare((points, triangles), tuple(SCHEMES))
+    assert all(np.isfinite(H).sum() >= len(points) - 4 for H in found.mean_curvature.values())
+
+
+# ---- faces without area ---------------------------------------------------------------------------------
+
+
+def plane_with_slivers(seed, scale, offset):
+    """Squares of a plane turned in space; along the middle vertices of one side divide the other's edges.
+
+    Triangles (a, m, b) over the middle m of (a, b) fill what is between.
+    """
+    n = 10
+    place, points, faces = {}, [], []
+
+    def vertex(x, y):
+        if (x, y) not in place:
+            place[x, y] = len(points)
+            points.append((x, y, 0.0))
+        return place[x, y]
+
+    for i in range(n):
+        for j in range(n):
+            if j < n // 2:
+                faces.append([vertex(i, j), vertex(i + 1, j), vertex(i + 1, j + 1), vertex(i, j + 1)])
+                continue
+            for x in (i, i + 0.5):
+                faces.append([vertex(x, j), vertex(x + 0.5, j), vertex(x + 0.5, j + 1), vertex(x, j + 1)])
+        faces.append([vertex(i, n // 2), vertex(i + 0.5, n // 2), vertex(i + 1, n // 2)][::-1])
+    return np.array(points) / n @ turn(seed) * scale + offset, faces, scale / n
+
+
+@each_laplacian
+@pytest.mark.parametrize(("scale", "offset"), PLACES)
+@pytest.mark.parametrize("seed", range(3))
+def test_slivers_of_a_turned_plane(scheme, seed, scale, offset):
+    """Their area is what rounding makes of 0: NaN at their corners, right everywhere else."""
+    points, faces, h = plane_with_slivers(seed, scale, offset)
+    mesh = qc.QuadMesh(points, faces)
+    sliver = np.unique(mesh.faces[mesh.faces[:, 3] < 0, :3])
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", qc.PrecisionWarning)
+        H = qc.mean_curvature(mesh, scheme)
+    if scheme.name != "finite_volume":  # it looks across the slivers, and is right there
+        assert np.isnan(H[sliver]).all()
+    inside = np.setdiff1d(np.flatnonzero(mesh.stencils().closed), sliver)
+    assert np.isfinite(H[inside]).all()
+    assert np.nanmax(np.abs(H)) < 1e3 * 2.0**-52 * np.abs(points).max() / h**2
+
+
+@each_laplacian
+@pytest.mark.parametrize(("scale", "offset"), PLACES)
+def test_a_quad_without_area(scheme, scale, offset):
+    """Two corners of a quad moved to the middle between the other two, and a little beyond."""
+    grid = surfaces.torus().sample((12, 10))[0]
+    points = grid.points @ turn(5) * scale + offset
+    points[4, 4], points[5, 5] = (2 * points[5, 4] + points[4, 5]) / 3, (points[5, 4] + 2 * points[4, 5]) / 3
+    broken = qc.QuadGrid(points, grid.wrap)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", qc.PrecisionWarning)
+        on_grid = qc.mean_curvature(broken, scheme)
+        on_faces = qc.mean_curvature(broken.to_mesh(), scheme).reshape(on_grid.shape)
+    assert np.array_equal(np.isnan(on_grid), np.isnan(on_faces))
+    corners = {(4, 4), (5, 4), (5, 5), (4, 5)}
+    missing = set(zip(*np.nonzero(np.isnan(on_grid)), strict=True))
+    assert missing == corners or (missing < corners and scheme.name == "cotan-4")
+
+
+@each_laplacian
+def test_half_a_face_without_area(scheme):
+    """Squares of a plane, one corner of some in line with two others: no curvature, or none known there."""
+    x, y = np.meshgrid(np.arange(8.0), np.arange(8.0), indexing="ij")
+    points = np.stack((x, y, 0 * x), axis=-1)
+    points[3, 3, :2] = 3.5, 3.5  # in the middle between (4, 3) and (3, 4)
+    H = qc.mean_curvature(qc.QuadGrid(points @ turn(2)), scheme)
+    missing = set(zip(*np.nonzero(np.isnan(H)), strict=True))
+    assert missing <= {(3, 3), (4, 3), (4, 4), (3, 4)}
+    assert np.nanmax(np.abs(H)) < 1e-12
+    if not scheme.name.startswith("cotan"):
+        assert not missing
+
+
+# ---- rings without area ---------------------------------------------------------------------------------
+
+
+@each_laplacian
+@pytest.mark.parametrize("offset", [0.0, 1e3, 1e6])
+def test_a_fold_has_no_normal(scheme, offset):
+    """A sheet folded back on itself along a line: the rings there have no vector area, hence no side."""
+    x, y = np.meshgrid(np.arange(-4.0, 5), np.arange(9.0), indexing="ij")
+    points = np.stack((np.abs(x), y, 0 * x), axis=-1) @ turn(7) + offset
+    for mesh in (qc.QuadGrid(points), qc.QuadGrid(points).to_mesh()):
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", qc.PrecisionWarning)
+            H = qc.mean_curvature(mesh, scheme).reshape(9, 9)
+            normals = qc.vertex_normals(mesh).reshape(9, 9, 3)
+        assert np.isnan(H[4]).all()
+        assert np.isnan(normals[4]).all()
+        assert np.isfinite(H[[2, 6], 2:-2]).all()
+
+
+def test_angle_defect_beside_an_edge_without_length():
+    """An angle there is anything; elsewhere at a triangle without area angles are known all the same."""
+    mesh = surfaces.cubed_sphere().sample((4, 4), "faces")[0]
+    points = mesh.points.copy()
+    a, b = mesh.faces[10, :2]
+    points[b] = points[a]
+    K = qc.gaussian_curvature((points, mesh.faces), "angle_defect")
+    assert set(np.flatnonzero(np.isnan(K))) == {a, b}
+    points, faces, _ = plane_with_slivers(0, 1.0, 0.0)
+    mesh = qc.QuadMesh(points, faces)
+    K = qc.gaussian_curvature(mesh, "angle_defect")
+    assert np.isfinite(K[mesh.stencils().closed]).all()
+    assert np.nanmax(np.abs(K)) < 1e-11
