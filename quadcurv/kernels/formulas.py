@@ -133,8 +133,8 @@ class Truth(_Value):
 class Memory:
     """A C-contiguous array of one dimension: one of the formula's, or a choice among several."""
 
-    def __init__(self, data, dtype, owners):
-        self.data, self.dtype, self.owners = data, dtype, owners
+    def __init__(self, data, size, dtype, owners):
+        self.data, self.size, self.dtype, self.owners = data, size, dtype, owners
 
     def address(self, index):
         """Pointer to an entry, which need not exist."""
@@ -168,7 +168,7 @@ def formula(function=None, *, contract=False):
             with _Draft(builder, sum(isinstance(t, types.Array) for t in given), contract):
                 owners = (frozenset((i,)) for i in count())
                 values = [
-                    Memory(context.make_array(t)(context, builder, x).data, t.dtype, next(owners))
+                    _memory(context.make_array(t)(context, builder, x), t.dtype, next(owners))
                     if isinstance(t, types.Array)
                     else _written(t, x)
                     for t, x in zip(given, arguments, strict=True)
@@ -215,6 +215,11 @@ def _written(t, value):
     return kind(value)
 
 
+def _memory(array, dtype, owners):
+    """An array of numba's as formulas see it."""
+    return Memory(array.data, Whole(array.nitems), dtype, owners)
+
+
 def _unknown(t):
     """The same where there is no value yet."""
     if isinstance(t, types.BaseTuple):
@@ -222,7 +227,8 @@ def _unknown(t):
     if isinstance(t, types.Array):
         if t.ndim != 1 or t.layout != "C":
             raise TypeError(f"formula: expected C-contiguous arrays of one dimension, got {t}")
-        return Memory(ir.Constant(_machine(t.dtype).as_pointer(), ir.Undefined), t.dtype, frozenset())
+        data, size = (ir.Constant(kind, ir.Undefined) for kind in (_machine(t.dtype).as_pointer(), _INT))
+        return Memory(data, Whole(size), t.dtype, frozenset())
     return _kind(t)(ir.Constant(_kind(t).kind, ir.Undefined))
 
 
@@ -250,7 +256,8 @@ def where(condition, a, b):
         return a if condition else b
     builder = _drafts[-1].builder
     if isinstance(a, Memory):
-        return Memory(builder.select(condition.value, a.data, b.data), a.dtype, a.owners | b.owners)
+        data, size = builder.select(condition.value, a.data, b.data), where(condition, a.size, b.size)
+        return Memory(data, size, a.dtype, a.owners | b.owners)
     kind = next((kind for kind in (Truth, Real) if isinstance(a, kind) or isinstance(b, kind)), Whole)
     if isinstance(a, float) or isinstance(b, float):
         kind = Real
