@@ -103,13 +103,12 @@ def _around(points: Floats, frame: Frame) -> tuple[Floats, Floats]:
         sides = [k, points.shape[1] - 1 - k]
         return np.concatenate((beyond[:1, sides], points[:, sides], beyond[1:, sides]))
 
-    near = columns(0)
     if across.size == 0:
-        beside = near[:, ::-1]
-    else:
-        beside = near.copy()
-        for k, weight in enumerate(across):
-            beside += weight * (columns(k) - near)
+        return flat(frame.beyond), flat(np.empty(0))
+    near = columns(0)
+    beside = near.copy()
+    for k, weight in enumerate(across):
+        beside += weight * (columns(k) - near)
     return flat(frame.beyond), flat(np.moveaxis(beside, 1, 0))
 
 

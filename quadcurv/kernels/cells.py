@@ -23,7 +23,7 @@ from quadcurv.kernels.rows import (
     Y,
     dual_areas,
     last_quad,
-    load_end,
+    load_ends,
     load_row,
     ring_normal,
     rooms,
@@ -152,19 +152,18 @@ def cell_curvatures(planes, p, q, a, b, work, part, scale, H, g, at, width):
 
 @kernel
 def _pass(points, size, beyond, beside, dual, liu, Hn, H, normal, area, start, stop, planes, part, work):
-    c, rows = beyond.size // 6, beside.size // 6
+    c, rows = beyond.size // 6, points.size // size
     vectors, numbers, normals, areas = Hn.size > 0, H.size > 0, normal.size > 0, area.size > 0
     scale = RING_SCALE if liu else SCALE
     for begin in range(0, c, WIDTH):
         end = min(begin + WIDTH, c)
         p, q, a, b = 0, ROW, 2 * ROW, 3 * ROW
         for i in range(start - 1, stop + 1):  # p and a are rows i - 1 once they are there
-            inside = 0 <= i < rows - 2
+            inside = 0 <= i < rows
             first = size * i if inside else 0 if i < 0 else 3 * c
             to, width, row = q + FIRST, end - begin, i + 1
             load_row(planes, to, points, beyond, inside, first + 3 * begin, width)
-            load_end(planes, to - 1, points, beyond, beside, inside, begin > 0, first + 3 * begin - 3, row)
-            load_end(planes, to + width, points, beyond, beside, inside, end < c, first + 3 * end, rows + row)
+            load_ends(planes, to, points, beyond, beside, inside, first, begin, end, c, row, rows)
             if i >= start:
                 load_dual(planes, b + FIRST, dual, 3 * ((c + 1) * i + begin), width + 1)
             if i == start:

@@ -11,6 +11,7 @@ and `span` leave it to the kernel. Arrays that a formula is given must not overl
 from __future__ import annotations
 
 import inspect
+import threading
 from itertools import count
 
 import numpy as np
@@ -21,7 +22,15 @@ from numba.extending import intrinsic
 
 _DOUBLE, _INT, _BOOL = ir.DoubleType(), ir.IntType(64), ir.IntType(1)
 _fresh = count()
-_drafts: list[_Draft] = []  # of the formulas that are being written down
+
+
+class _Desk(threading.local):
+    """The formulas that a thread writes down, the last one at the moment."""
+
+    drafts: tuple[_Draft, ...] = ()
+
+
+_desk = _Desk()
 
 
 class _Draft:
@@ -32,11 +41,11 @@ class _Draft:
         self._scopes = []
 
     def __enter__(self):
-        _drafts.append(self)
+        _desk.drafts = (*_desk.drafts, self)
         return self
 
     def __exit__(self, *_):
-        _drafts.pop()
+        _desk.drafts = _desk.drafts[:-1]
 
     def marked(self, instruction, owners):
         """A load or store that is of some of the arrays and of no other one.
@@ -81,7 +90,7 @@ def _operator(instruction, swapped=False):
         if b is None:
             return NotImplemented
         a, b = (b, a) if swapped else (a, b)
-        draft = _drafts[-1]
+        draft = _desk.drafts[-1]
         flags = {"flags": ("contract",)} if draft.contract and self.kind is _DOUBLE else {}
         return type(self)(getattr(draft.builder, instruction)(a, b, **flags))
 
@@ -90,7 +99,7 @@ def _operator(instruction, swapped=False):
 
 def _comparison(instruction, sign):
     def compare(self, other):
-        return Truth(getattr(_drafts[-1].builder, instruction)(sign, self.value, self.of(other)))
+        return Truth(getattr(_desk.drafts[-1].builder, instruction)(sign, self.value, self.of(other)))
 
     return compare
 
@@ -108,7 +117,7 @@ class Real(_Value):
     __ne__ = _comparison("fcmp_unordered", "!=")
 
     def __neg__(self):
-        return Real(_drafts[-1].builder.fneg(self.value))
+        return Real(_desk.drafts[-1].builder.fneg(self.value))
 
 
 class Whole(_Value):
@@ -133,20 +142,20 @@ class Truth(_Value):
 class Memory:
     """A C-contiguous array of one dimension: one of the formula's, or a choice among several."""
 
-    def __init__(self, data, dtype, owners):
-        self.data, self.dtype, self.owners = data, dtype, owners
+    def __init__(self, data, size, dtype, owners):
+        self.data, self.size, self.dtype, self.owners = data, size, dtype, owners
 
     def address(self, index):
         """Pointer to an entry, which need not exist."""
-        return _drafts[-1].builder.gep(self.data, [Whole.of(index)])
+        return _desk.drafts[-1].builder.gep(self.data, [Whole.of(index)])
 
     def __getitem__(self, index):
-        draft = _drafts[-1]
+        draft = _desk.drafts[-1]
         value = draft.marked(draft.builder.load(self.address(index)), self.owners)
         return _written(self.dtype, value)
 
     def __setitem__(self, index, x):
-        draft, machine = _drafts[-1], _machine(self.dtype)
+        draft, machine = _desk.drafts[-1], _machine(self.dtype)
         value = _kind(self.dtype).of(x)
         if value.type != machine:
             value = (draft.builder.zext if value.type == _BOOL else draft.builder.trunc)(value, machine)
@@ -168,7 +177,7 @@ def formula(function=None, *, contract=False):
             with _Draft(builder, sum(isinstance(t, types.Array) for t in given), contract):
                 owners = (frozenset((i,)) for i in count())
                 values = [
-                    Memory(context.make_array(t)(context, builder, x).data, t.dtype, next(owners))
+                    _memory(context.make_array(t)(context, builder, x), t.dtype, next(owners))
                     if isinstance(t, types.Array)
                     else _written(t, x)
                     for t, x in zip(given, arguments, strict=True)
@@ -204,7 +213,7 @@ def _machine(t):
 
 def _written(t, value):
     """A value of a type of numba's as formulas see it."""
-    builder = _drafts[-1].builder
+    builder = _desk.drafts[-1].builder
     if isinstance(t, types.BaseTuple):
         return tuple(map(_written, t, cgutils.unpack_tuple(builder, value)))
     kind = _kind(t)
@@ -215,6 +224,11 @@ def _written(t, value):
     return kind(value)
 
 
+def _memory(array, dtype, owners):
+    """An array of numba's as formulas see it."""
+    return Memory(array.data, Whole(array.nitems), dtype, owners)
+
+
 def _unknown(t):
     """The same where there is no value yet."""
     if isinstance(t, types.BaseTuple):
@@ -222,7 +236,8 @@ def _unknown(t):
     if isinstance(t, types.Array):
         if t.ndim != 1 or t.layout != "C":
             raise TypeError(f"formula: expected C-contiguous arrays of one dimension, got {t}")
-        return Memory(ir.Constant(_machine(t.dtype).as_pointer(), ir.Undefined), t.dtype, frozenset())
+        data, size = (ir.Constant(kind, ir.Undefined) for kind in (_machine(t.dtype).as_pointer(), _INT))
+        return Memory(data, Whole(size), t.dtype, frozenset())
     return _kind(t)(ir.Constant(_kind(t).kind, ir.Undefined))
 
 
@@ -248,9 +263,10 @@ def where(condition, a, b):
     """A where a condition holds, else b: numbers, or arrays."""
     if not isinstance(condition, Truth):
         return a if condition else b
-    builder = _drafts[-1].builder
+    builder = _desk.drafts[-1].builder
     if isinstance(a, Memory):
-        return Memory(builder.select(condition.value, a.data, b.data), a.dtype, a.owners | b.owners)
+        data, size = builder.select(condition.value, a.data, b.data), where(condition, a.size, b.size)
+        return Memory(data, size, a.dtype, a.owners | b.owners)
     kind = next((kind for kind in (Truth, Real) if isinstance(a, kind) or isinstance(b, kind)), Whole)
     if isinstance(a, float) or isinstance(b, float):
         kind = Real
@@ -264,10 +280,10 @@ def span(start, stop, together=None):
     the coordinates of points apart use them all the same, and then the other half of the unit stands idle.
     With `together` so many vectors go through the loop side by side: none waits long for its own results.
     """
-    if not _drafts:
+    if not _desk.drafts:
         yield from range(start, stop)
         return
-    builder, module = _drafts[-1].builder, _drafts[-1].builder.module
+    builder, module = _desk.drafts[-1].builder, _desk.drafts[-1].builder.module
     if isinstance(builder.function.attributes, set):  # which knows no attribute of a single processor
         set.add(builder.function.attributes, '"prefer-vector-width"="512"')
     start, stop, before = Whole.of(start), Whole.of(stop), builder.block
@@ -294,32 +310,32 @@ class Carried:
 
     def __init__(self, values):
         self._values = values
-        if _drafts:
+        if _desk.drafts:
             self._kinds = [type(x) if isinstance(x, _Value) else Real for x in values]
             self._places = [
-                cgutils.alloca_once_value(_drafts[-1].builder, kind.of(x))
+                cgutils.alloca_once_value(_desk.drafts[-1].builder, kind.of(x))
                 for kind, x in zip(self._kinds, values, strict=True)
             ]
 
     def get(self):
         """What the turn before left, or the loop begins with."""
-        if not _drafts:
+        if not _desk.drafts:
             return self._values
-        load = _drafts[-1].builder.load
+        load = _desk.drafts[-1].builder.load
         return tuple(kind(load(place)) for kind, place in zip(self._kinds, self._places, strict=True))
 
     def set(self, values):
         """Leave other values."""
-        if not _drafts:
+        if not _desk.drafts:
             self._values = values
             return
         for kind, place, x in zip(self._kinds, self._places, values, strict=True):
-            _drafts[-1].builder.store(kind.of(x), place)
+            _desk.drafts[-1].builder.store(kind.of(x), place)
 
 
 def _called(name, returned, arguments):
     """A call of a function of the compiler's own."""
-    builder = _drafts[-1].builder
+    builder = _desk.drafts[-1].builder
     kind = ir.FunctionType(returned, [x.type for x in arguments])
     return builder.call(cgutils.get_or_insert_function(builder.module, kind, name), arguments)
 
@@ -341,13 +357,15 @@ def root(x):
 
 def real(x):
     """A whole number as a float."""
-    return Real(_drafts[-1].builder.sitofp(x.value, _DOUBLE)) if isinstance(x, Whole) else float(x)
+    return Real(_desk.drafts[-1].builder.sitofp(x.value, _DOUBLE)) if isinstance(x, Whole) else float(x)
 
 
 def bits(x):
     """The bits of a float, as a whole number."""
     return (
-        Whole(_drafts[-1].builder.bitcast(x.value, _INT)) if isinstance(x, Real) else np.float64(x).view(int)
+        Whole(_desk.drafts[-1].builder.bitcast(x.value, _INT))
+        if isinstance(x, Real)
+        else np.float64(x).view(int)
     )
 
 
@@ -355,7 +373,7 @@ def less_half(bits, x):
     """The number whose bits are these less half of those of x."""
     if not isinstance(x, Real):
         return (np.uint64(bits) - (np.float64(x).view(np.uint64) >> np.uint64(1))).view(np.float64)
-    builder = _drafts[-1].builder
+    builder = _desk.drafts[-1].builder
     half = builder.lshr(builder.bitcast(x.value, _INT), _INT(1))
     return Real(builder.bitcast(builder.sub(_INT(bits), half), _DOUBLE))
 
@@ -364,7 +382,7 @@ def prefetch(values, index, write=False):
     """Ask for the memory of an entry of an array, which need not exist."""
     if isinstance(values, Memory):
         word = ir.IntType(32)
-        line = _drafts[-1].builder.bitcast(values.address(index), cgutils.voidptr_t)
+        line = _desk.drafts[-1].builder.bitcast(values.address(index), cgutils.voidptr_t)
         _called(
             "llvm.prefetch.p0", ir.VoidType(), [line, word(int(write)), word(3), word(1)]
         )  # keep near, data

@@ -51,10 +51,26 @@ def load_row(planes, to, points, beyond, inside, at, width):
 
 
 @formula
-def load_end(planes, to, points, beyond, beside, inside, within, at, row):
-    """Put the point before or after a row, or that of `beside` where rows end, into planes."""
-    points = where(within, where(inside, points, beyond), beside)
-    place(planes, to, Y, triple(points, where(within, at, 3 * row), 1))
+def load_ends(planes, to, points, beyond, beside, inside, first, begin, end, columns, row, rows):
+    """Put the points before and after columns begin..end of a row, which begins at `first`, into planes.
+
+    Where rows end they are those of `beside` at place `row`, or of a closed row the last and the first point.
+    """
+    closed, last = beside.size == 0, 3 * (columns - 1)
+    points = where(inside, points, beyond)
+    for at, within, next_to, other, place_beside in (
+        (to - 1, begin > 0, 3 * begin - 3, last, row),
+        (to + (end - begin), end < columns, 3 * end, 0, rows + 2 + row),
+    ):
+        source = where(within | closed, points, beside)
+        place(
+            planes,
+            at,
+            Y,
+            triple(
+                source, where(within | closed, first + where(within, next_to, other), 3 * place_beside), 1
+            ),
+        )
 
 
 def diagonals(planes, p, q, i):
@@ -225,7 +241,7 @@ def ask_to_write(values, begin):
 def _pass(points, size, beyond, beside, liu, Hn, H, normal, area, start, stop, planes, part, work, unwanted):
     # No array is made or chosen inside the loops: counting who holds it would wait for all that is being
     # written. An array of size 0 is a result that nobody wants.
-    c, rows = beyond.size // 6, beside.size // 6
+    c, rows = beyond.size // 6, points.size // size
     vectors, numbers, normals, areas = Hn.size > 0, H.size > 0, normal.size > 0, area.size > 0
     scale = RING_SCALE if liu else SCALE
     for begin in range(0, c, WIDTH):
@@ -233,7 +249,7 @@ def _pass(points, size, beyond, beside, liu, Hn, H, normal, area, start, stop, p
         o, p, q, fresh = 0, ROW, 2 * ROW, 3 * ROW
         for i in range(start - 3, stop):
             ahead, wanted = min(i + 2, stop), i >= start  # the row that is loaded; whether there are results
-            inside = 0 <= ahead < rows - 2
+            inside = 0 <= ahead < rows
             first = size * ahead if inside else 0 if ahead < 0 else 3 * c
             for left in range(begin, end, STRETCH):
                 right = min(left + STRETCH, end)
@@ -290,18 +306,7 @@ def _pass(points, size, beyond, beside, liu, Hn, H, normal, area, start, stop, p
                 if wanted and areas:
                     dual_areas(work, liu, area, at, width)
             to, row = fresh + FIRST, ahead + 1
-            load_end(planes, to - 1, points, beyond, beside, inside, begin > 0, first + 3 * begin - 3, row)
-            load_end(
-                planes,
-                to + end - begin,
-                points,
-                beyond,
-                beside,
-                inside,
-                end < c,
-                first + 3 * end,
-                rows + row,
-            )
+            load_ends(planes, to, points, beyond, beside, inside, first, begin, end, c, row, rows)
             o, p, q, fresh = p, q, fresh, o
 
 
@@ -316,7 +321,8 @@ def grid_curvatures(points, size, beyond, beside, liu, Hn, H, normal, area, star
     beyond : (6 c,) float64
         The rows before the first one and after the last one.
     beside : (6 (r + 2),) float64
-        The columns before the first one and after the last one, those of the rows of `beyond` too.
+        The columns before the first one and after the last one, those of the rows of `beyond` too. Of size 0
+        where rows are closed.
     liu : bool
         Dual areas of Liu's formula, not those of the finite-volume scheme.
     Hn, normal : (3 r c,) float64
