@@ -13,6 +13,7 @@ from quadcurv.stencils import Frame, Stencils
 from quadcurv.types import Bools, Floats, Indices, Ints, MeshError
 
 DEGREE = 4
+_WEIGHTS = index_weights(DEGREE)
 
 
 def ghost_layer(
@@ -104,8 +105,7 @@ def _at_corner(lines: Floats) -> Floats:
     """Continue two lines of ghosts by index, NaN where these are too few."""
     if lines.shape[1] <= DEGREE:
         return np.full((2, 3), np.nan)
-    near = lines[:, : DEGREE + 1] - lines[:, :1]
-    return lines[:, 0] + np.einsum("j,kjx->kx", index_weights(DEGREE), near)
+    return lines[:, 0] + _WEIGHTS @ (lines[:, : DEGREE + 1] - lines[:, :1])
 
 
 def _continue(points: Floats, axis: int, end: int, ghosts: Floats, wraps: bool) -> Bools | None:

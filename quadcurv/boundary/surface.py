@@ -21,6 +21,7 @@ ROOM = 128  # vertices of a neighbourhood
 _CHUNK = 1024  # fits at a time
 _CONDITION = 1e5
 _SPREAD = 1.3  # radius at which weights vanish, of the neighbourhood's
+_THIN = 1e-8  # of a neighbourhood's spread: no more than a line
 _STEEP = 0.45  # cosine between normals; where it is less, polynomials of several rings do not follow
 _TERMS = [(a, d - a) for d in range(1, RINGS + 1) for a in range(d, -1, -1)]
 
@@ -34,9 +35,10 @@ class Surfaces(NamedTuple):
         The vertices, where z = 0.
     frames : (k, 3, 3) float64
         Two tangents and the normal.
+    maps : (k, 2, 2) float64
+        From tangent coordinates to those, of unit size and spread, in which the polynomials are given.
     coefficients : (k, terms) float64
-        Of x^a y^b in units of `radius`, in the order of `_TERMS`; NaN where none is determined.
-    radius : (k,) float64
+        In the order of `_TERMS`; NaN where none is determined.
     error : (k,) float64
         Of points about the mirror images of the first ring, estimated; infinite where none is determined.
     noise : (k,) float64
@@ -51,8 +53,8 @@ class Surfaces(NamedTuple):
 
     points: Floats
     frames: Floats
+    maps: Floats
     coefficients: Floats
-    radius: Floats
     error: Floats
     noise: Floats
     gain: Floats
@@ -65,8 +67,8 @@ class Surfaces(NamedTuple):
 
     def lifted(self, x: Floats) -> Floats:
         """Points (k, j, 3) of the surfaces over tangent coordinates (k, j, 2)."""
-        terms = _terms(x / self.radius[:, None, None], RINGS)
-        z = np.einsum("kjt,kt->kj", terms, self.coefficients) * self.radius[:, None]
+        terms = _terms(np.einsum("kab,kjb->kja", self.maps, x), RINGS)
+        z = np.einsum("kjt,kt->kj", terms, self.coefficients)
         local = np.concatenate((x, z[..., None]), axis=2)
         return np.einsum("kax,kja->kjx", self.frames, local) + self.points[:, None]
 
@@ -85,12 +87,9 @@ def fitted(stencils: Stencils, vertices: Indices) -> Surfaces:
     around, ring = around[:, :size], ring[:, :size]
     frames = _frames(_normals(stencils, vertices, around, ring))
     k = vertices.size
-    coefficients = np.full((k, len(_FITS), len(_TERMS)), np.nan)
-    radius, noise, gain, bend = np.full((4, k, len(_FITS)), np.nan)
-    for begin in range(0, k, _CHUNK):
-        at = slice(begin, begin + _CHUNK)
-        fits = _fits(stencils, frames[at], around[at], ring[at])
-        coefficients[at], radius[at], noise[at], gain[at], bend[at] = fits
+    chunks = [slice(begin, begin + _CHUNK) for begin in range(0, max(k, 1), _CHUNK)]
+    fits = [_fits(stencils, frames[at], around[at], ring[at]) for at in chunks]
+    maps, coefficients, noise, gain, bend = (np.concatenate(x) for x in zip(*fits, strict=True))
     # Residuals of the vertices near tell more than those of one, which may be few.
     place = np.full(len(stencils.points), -1)
     place[vertices] = np.arange(k)
@@ -101,7 +100,7 @@ def fitted(stencils: Stencils, vertices: Indices) -> Surfaces:
     noise = np.where(np.isfinite(noise), np.sqrt(shared), np.inf)
     error = np.where(np.isfinite(noise), noise * gain, np.inf)
     best = np.arange(k), np.argmin(error, axis=1)
-    chosen = (values[best] for values in (coefficients, radius, error, noise, bend))
+    chosen = (values[best] for values in (maps, coefficients, error, noise, bend))
     return Surfaces(stencils.points[vertices], frames, *chosen, around, ring)
 
 
@@ -129,28 +128,47 @@ def _frames(normal: Floats) -> Floats:
 def _fits(
     stencils: Stencils, frames: Floats, around: Ints, ring: Ints
 ) -> tuple[Floats, Floats, Floats, Floats, Floats]:
-    """Coefficients (k, degrees, terms), radius, noise, its gain and that in H (k, degrees) of every degree."""
+    """Maps, coefficients, noise, its gain beyond the border and that in H, all (k, fits, ...)."""
     x = stencils.points[around] - stencils.points[around[:, :1]]
     x = np.einsum("kax,kmx->kma", frames, x)
     known = (around >= 0) & (ring > 0)
-    distance = np.hypot(x[..., 0], x[..., 1])
     steep = _steep(stencils, frames[:, 2], around, known)
-    coefficients = np.full((len(x), len(_FITS), len(_TERMS)), np.nan)
-    radius, noise, gain, bend = np.full((4, len(x), len(_FITS)), np.nan)
+    shape = len(x), len(_FITS)
+    maps, coefficients = np.full((*shape, 2, 2), np.nan), np.full((*shape, len(_TERMS)), np.nan)
+    noise, gain, bend = np.full((3, *shape), np.nan)
     for d, (degree, rings) in enumerate(_FITS):
         inside = known & (ring <= rings)
-        r = distance.max(axis=1, where=inside, initial=0.0)
         terms = (degree + 1) * (degree + 2) // 2 - 1
-        fit = (inside.sum(axis=1) > terms) & (r > 0)
+        fit = (inside.sum(axis=1) > terms) & np.isfinite(frames[:, 2, 0])
         if degree > 2:
             fit &= ~(steep & inside).any(axis=1)
-        if not fit.any():
-            continue
-        scaled = x[fit] / r[fit, None, None]
-        c, sigma, gain[fit, d], curving = _fit(scaled, inside[fit], ring[fit] == 1, degree)
-        coefficients[fit, d] = np.pad(c, [(0, 0), (0, len(_TERMS) - terms)])
-        radius[fit, d], noise[fit, d], bend[fit, d] = r[fit], sigma * r[fit], curving / r[fit] ** 2
-    return coefficients, radius, noise, gain, bend
+        at = np.flatnonzero(fit)
+        own, spread_out = _maps(x[at], inside[at])
+        at, own = at[spread_out], own[spread_out]
+        if at.size:
+            u = np.einsum("kab,kmb->kma", own, x[at, :, :2])
+            c, noise[at, d], gain[at, d], bend[at, d] = _fit(
+                u, x[at, :, 2], inside[at], ring[at] == 1, degree, own @ np.swapaxes(own, 1, 2)
+            )
+            maps[at, d], coefficients[at, d] = own, np.pad(c, [(0, 0), (0, len(_TERMS) - terms)])
+    return maps, coefficients, noise, gain, bend
+
+
+def _maps(x: Floats, inside: Bools) -> tuple[Floats, Bools]:
+    """Linear maps that make the spread of points round and their distance 1 at most; whether there is any."""
+    x = np.where(inside[..., None], x[..., :2], 0.0)
+    size = np.abs(x).max(axis=(1, 2), initial=0.0)
+    spread_out = size > 0
+    x = x / np.where(spread_out, size, 1.0)[:, None, None]
+    xx, xy, yy = (np.einsum("km,km->k", x[..., a], x[..., b]) for a, b in ((0, 0), (0, 1), (1, 1)))
+    spread_out &= xx * yy - xy * xy > _THIN * xx * yy
+    xx, xy, yy = (np.where(spread_out, v, w) for v, w in ((xx, 1.0), (xy, 0.0), (yy, 1.0)))
+    # The inverse of the Cholesky factor of the second moments.
+    one, other = 1 / np.sqrt(xx), 1 / np.sqrt(yy - xy * xy / xx)
+    maps = np.zeros((len(x), 2, 2))
+    maps[:, 0, 0], maps[:, 1, 0], maps[:, 1, 1] = one, -xy / xx * other, other
+    distance = np.linalg.norm(np.einsum("kab,kmb->kma", maps, x), axis=2).max(axis=1, initial=0.0)
+    return maps / np.where(spread_out, size * distance, 1.0)[:, None, None], spread_out
 
 
 def _steep(stencils: Stencils, normal: Floats, around: Ints, known: Bools) -> Bools:
@@ -171,26 +189,30 @@ def _terms(x: Floats, degree: int) -> Floats:
     return np.stack(terms, axis=-1)
 
 
-def _fit(x: Floats, inside: Bools, first: Bools, degree: int) -> tuple[Floats, Floats, Floats, Floats]:
+def _fit(
+    u: Floats, z: Floats, inside: Bools, first: Bools, degree: int, metric: Floats
+) -> tuple[Floats, Floats, Floats, Floats]:
     """Coefficients, noise by the residuals, what of it reaches mirror images of the first ring, and H."""
-    r = np.hypot(x[..., 0], x[..., 1])
+    r = np.where(inside, np.hypot(u[..., 0], u[..., 1]), 0.0)
     # Wendland's function: smooth, and zero from there on.
     weight = np.where(inside, (1 - r / _SPREAD) ** 4 * (4 * r / _SPREAD + 1), 0.0)
-    terms = _terms(np.where(inside[..., None], x[..., :2], 0.0), degree)
+    terms = _terms(np.where(inside[..., None], u, 0.0), degree)
     q, upper = np.linalg.qr(terms * weight[..., None])
     singular = np.linalg.svd(upper, compute_uv=False)
     well = singular[:, -1] * _CONDITION > singular[:, 0]
     inverse = np.linalg.inv(np.where(well[:, None, None], upper, np.eye(upper.shape[-1])))
-    z = np.where(inside, x[..., 2], 0.0)
-    coefficients = np.einsum("kts,kms,km->kt", inverse, q, weight * z, optimize=True)
+    z = np.where(inside, z, 0.0)
+    from_heights = np.einsum("kts,kms,km->ktm", inverse, q, weight, optimize=True)
+    coefficients = np.einsum("ktm,km->kt", from_heights, z)
     residual = weight * (z - np.einsum("kmt,kt->km", terms, coefficients))
     # The mean square of weighted residuals, for independent errors of one size.
     free = (weight**2).sum(axis=1) - np.einsum("kmt,km->k", q**2, weight**2)
-    sigma = np.sqrt((residual**2).sum(axis=1) / np.maximum(free, np.finfo(float).tiny))
-    beyond = _terms(np.where(first[..., None], -x[..., :2], 0.0)[:, : first.sum(axis=1).max() + 1], degree)
-    spread = np.einsum("kjt,kts,kms,km->kjm", beyond, inverse, q, weight, optimize=True)
-    gain = np.sqrt((spread**2).sum(axis=(1, 2)) / first.sum(axis=1))
-    second = np.array([float(t in ((2, 0), (0, 2))) for t in _TERMS[: terms.shape[2]]])
-    bend = np.linalg.norm(np.einsum("t,kts,kms,km->km", second, inverse, q, weight, optimize=True), axis=1)
-    coefficients[~well] = sigma[~well] = np.nan
-    return coefficients, sigma, gain, bend
+    noise = np.sqrt((residual**2).sum(axis=1) / np.maximum(free, np.finfo(float).tiny))
+    beyond = _terms(np.where(first[..., None], -u, 0.0)[:, : first.sum(axis=1).max() + 1], degree)
+    gain = np.sqrt(((beyond @ from_heights) ** 2).sum(axis=(1, 2)) / first.sum(axis=1))
+    second = np.zeros((len(u), terms.shape[2]))
+    for t, (a, b) in (((2, 0), (0, 0)), ((1, 1), (0, 1)), ((0, 2), (1, 1))):
+        second[:, _TERMS.index(t)] = metric[:, a, b]
+    bend = np.linalg.norm(np.einsum("kt,ktm->km", second, from_heights), axis=1)
+    coefficients[~well] = noise[~well] = np.nan
+    return coefficients, noise, gain, bend
