@@ -17,11 +17,14 @@ and those whose neighbours are too few for a surface.
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import NDArray
 
 from quadcurv.boundary.closing import EXTRAPOLATED, FITTED, INTERIOR, OPEN, REACH, closed
 from quadcurv.boundary.mirror import mirrored
+from quadcurv.boundary.poles import closed_grid, parts_at_poles, poles
 from quadcurv.boundary.sides import cell_ghosts, frame, ghost_layer
 from quadcurv.boundary.strips import ghosts
 from quadcurv.boundary.surface import fitted
@@ -45,6 +48,7 @@ __all__ = [
     "ghosts",
     "mirrored",
     "one_rings",
+    "parts_at_poles",
     "roughness",
 ]
 
@@ -107,7 +111,14 @@ def _treated(mesh: Mesh, boundary: str) -> tuple[Stencils, NDArray[np.uint8]]:
     checked_boundary(boundary)
     if isinstance(mesh, QuadGrid) and mesh.mask is not None:
         mesh = mesh.to_mesh()
+    found = poles(mesh) if isinstance(mesh, QuadGrid) else []
     given = mesh.stencils()
+    if found:
+        treated, treatment = closed_grid(mesh, found)
+        if boundary == "nan":
+            treatment = np.where(given.closed, treatment, OPEN).astype(np.uint8)
+            treated = replace(treated, closed=treatment != OPEN)
+        return treated, treatment
     if boundary == "nan" or (isinstance(mesh, StaggeredGrid) and mesh.has_ghosts):
         return given, np.where(given.closed, INTERIOR, OPEN).astype(np.uint8)
     if not isinstance(mesh, StaggeredGrid):

@@ -3,47 +3,43 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import NamedTuple
-
 import numpy as np
 from numpy.typing import NDArray
 
 from quadcurv.boundary.lines import NODES
-from quadcurv.boundary.stars import Stars, fans, stars
+from quadcurv.boundary.stars import Stars, fans, regular_stars, stars
 from quadcurv.boundary.strips import Ghosts, ghosts
 from quadcurv.boundary.surface import fitted
 from quadcurv.stencils import Stencils
-from quadcurv.types import Indices
+from quadcurv.types import Indices, Ints
 
 OPEN, INTERIOR, EXTRAPOLATED, FITTED = 0, 1, 2, 3
 REACH = NODES - 1  # faces from the border inward that closing it looks at
 
 
-class Part(NamedTuple):
-    """The faces near the border of a mesh: which vertices these are, and their stencils."""
+def closed(given: Stencils, pole: Indices | None = None) -> tuple[Stencils, NDArray[np.uint8]]:
+    """Stencils with rings closed at the border of a face list, and what closes each.
 
-    vertices: Indices
-    stencils: Stencils
-
-
-def border_part(given: Stencils) -> Part:
-    """All that closing the border of a mesh looks at."""
+    With `pole` (n,), the vertex that stands for all at the place of a pole, -1 for others, rings at poles and
+    beside them are closed anew by fitted surfaces.
+    """
     from quadcurv.kernels import topology
 
-    border = np.flatnonzero(~given.closed)
-    vertices, faces = topology.part_around(given.faces, border, given.n, REACH)
-    closed = given.closed[vertices]
-    return Part(vertices, Stencils(given.points[vertices], faces, closed.shape, closed, given.orientable))
-
-
-def closed(given: Stencils) -> tuple[Stencils, NDArray[np.uint8]]:
-    """Stencils of a face list with rings closed at the border, and what closes each."""
     treatment = np.where(given.closed, INTERIOR, OPEN).astype(np.uint8)
-    if given.closed.all():
+    border = np.flatnonzero(~given.closed)
+    if pole is not None:
+        border = np.union1d(border, _beside(given.faces, np.unique(pole[pole >= 0])))
+    if border.size == 0:
         return given, treatment
-    vertices, part = border_part(given)
+    vertices, faces = topology.part_around(given.faces, border, given.n, REACH)
+    part = Stencils(given.points[vertices], faces, vertices.shape, given.closed[vertices], given.orientable)
     layer = ghosts(part)
-    star_of = _stars(part, layer)
+    if pole is None:
+        star_of = _stars(part, layer)
+    else:
+        place = np.full(given.n + 1, -1)
+        place[vertices] = np.arange(vertices.size)
+        star_of = _stars_at_poles(part, layer, place[pole[vertices]])
     extrapolated = np.isfinite(layer.error)
     for rows, _ in star_of:
         extrapolated[rows] = False
@@ -91,9 +87,29 @@ def _stars(part: Stencils, layer: Ghosts) -> list[tuple[Indices, Stars]]:
     found, begin = [], 0
     for fan in groups:
         error = surfaces.error[begin : begin + fan.vertex.size]
-        rows = begin + np.flatnonzero(error < layer.error[fan.vertex])
+        kept = np.flatnonzero(error < layer.error[fan.vertex])
+        if kept.size:
+            own, at = fan.of(kept), surfaces.of(begin + kept)
+            found += [(own.vertex[rows], star) for rows, star in stars(part, own, at)]
         begin += fan.vertex.size
-        fan = fan.of(rows - (begin - fan.vertex.size))
-        if fan.vertex.size:
-            found += [(fan.vertex[at], star) for at, star in stars(part, fan, surfaces.of(rows))]
     return found
+
+
+def _stars_at_poles(part: Stencils, layer: Ghosts, pole: Indices) -> list[tuple[Indices, Stars]]:
+    """As `_stars`; of poles and the vertices beside them regular ones, in place of their narrow triangles."""
+    poles = np.unique(pole[pole >= 0])
+    beside = _beside(part.faces, poles)
+    layer.error[beside], layer.smooth[beside] = np.inf, True
+    found = _stars(part, layer)
+    rows = np.union1d(beside, np.flatnonzero(pole >= 0))
+    fit_at = np.where(pole[rows] >= 0, pole[rows], rows)
+    at, own = np.unique(fit_at, return_inverse=True)
+    surfaces = fitted(part, at)
+    known = np.isfinite(surfaces.error[own])
+    return [*found, (rows[known], regular_stars(part, surfaces.of(own[known])))]
+
+
+def _beside(faces: Ints, poles: Indices) -> Indices:
+    """Vertices of the faces at poles, these too."""
+    near = np.unique(faces[np.isin(faces, poles).any(axis=1)])
+    return near[near >= 0].astype(np.int64)

@@ -103,9 +103,7 @@ def stars(stencils: Stencils, fan: Fans, surfaces: Surfaces) -> list[tuple[Indic
     found = []
     for rows in _alike(np.column_stack((kept, right, widest, sound, quads, fan.slot % 2))):
         if not sound[rows[0]]:
-            found.append(
-                (rows, _regular(surfaces.of(rows), np.linalg.norm(edges[rows], axis=2).mean(axis=1)))
-            )
+            found.append((rows, regular_stars(stencils, surfaces.of(rows))))
             continue
         mirrored = kept[rows[0]]
         step = _steps(offset[rows][:, mirrored], gap[rows])
@@ -219,8 +217,11 @@ def bent(twist: Floats, a: Floats, b: Floats) -> Floats:
     return twist * np.minimum(1, most / np.maximum(size, np.finfo(float).tiny))[..., None]
 
 
-def _regular(surfaces: Surfaces, size: Floats) -> Stars:
-    """Four quads on the surface, with edges of a size."""
+def regular_stars(stencils: Stencils, surfaces: Surfaces) -> Stars:
+    """Four quads on each surface, with edges as long as the distance of the first ring."""
+    first = surfaces.ring == 1
+    near = surfaces.flat(stencils.points[surfaces.around])
+    size = np.linalg.norm(near, axis=2).sum(axis=1, where=first) / np.maximum(first.sum(axis=1), 1)
     x, y = np.meshgrid([-1.0, 0, 1], [-1.0, 0, 1], indexing="ij")
     local = size[:, None, None] * np.stack((x.ravel(), y.ravel()), axis=1)
     points = surfaces.lifted(local)[:, [4, 0, 1, 2, 3, 5, 6, 7, 8]]

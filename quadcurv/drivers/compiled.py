@@ -11,7 +11,7 @@ from functools import partial
 import numpy as np
 import scipy
 
-from quadcurv.boundary import REACH, closed, frame, one_rings
+from quadcurv.boundary import REACH, closed, frame, one_rings, parts_at_poles
 from quadcurv.drivers import direct
 from quadcurv.mesh import QuadGrid, QuadMesh, StaggeredGrid
 from quadcurv.schemes import Diamond, Laplacian
@@ -48,6 +48,10 @@ def evaluate_grid(
         return
     if unserved.size:
         _evaluate_part(grid, unserved, scheme, results)
+    if isinstance(grid, QuadGrid):
+        for vertices, part, beside in parts_at_poles(grid):
+            treated = one_rings(part, boundary)
+            _fill(results, vertices[beside], part.stencils(), treated, scheme, np.flatnonzero(beside))
     cut = {"dual_areas"} if boundary == "extrapolate" else {"dual_areas", "vertex_normals"}
     if cut & results.keys():
         _evaluate_sides(grid, scheme, {name: results[name] for name in cut & results.keys()})
@@ -66,11 +70,23 @@ def _evaluate_part(
         treated, place = closed(given)[0], np.arange(others.size)
     else:
         treated = one_rings(grid)
+    _fill(results, others, given, treated, scheme, place)
+
+
+def _fill(
+    results: Mapping[str, Floats],
+    vertices: Indices,
+    given: Stencils,
+    treated: Stencils,
+    scheme: Laplacian,
+    place: Indices,
+) -> None:
+    """Give some vertices of a grid the results at some places in other stencils."""
     inner = {name: np.empty(given.shape + direct.PER_VERTEX[name]) for name in results}
     direct.evaluate(given, treated, scheme, inner)
     for name, values in inner.items():
         rows = (-1, *direct.PER_VERTEX[name])
-        results[name].reshape(rows)[others] = values.reshape(rows)[place]
+        results[name].reshape(rows)[vertices] = values.reshape(rows)[place]
 
 
 def _evaluate_sides(grid: QuadGrid | StaggeredGrid, scheme: Laplacian, results: Mapping[str, Floats]) -> None:
