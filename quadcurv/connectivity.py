@@ -86,13 +86,13 @@ class Connectivity:
 
     @cached_property
     def irregular_part(self) -> tuple[Indices, Ints]:
-        """Vertices and faces of the part of the mesh within four faces of irregular vertices, these first.
+        """Vertices and faces of the part of the mesh within five faces of irregular vertices, these first.
 
         They have there all that a ghost layer or a scheme may look at.
         """
         from quadcurv.kernels import topology
 
-        return topology.part_around(self.faces, self.irregular, len(self.kind), 4)
+        return topology.part_around(self.faces, self.irregular, len(self.kind), 5)
 
     def reordered(self) -> Connectivity:
         """Return the same with an order that keeps neighbours near, where that pays."""

@@ -69,15 +69,14 @@ class Frame(NamedTuple):
 
     Attributes
     ----------
-    beyond : (6 c,) float64
+    beyond : (2, c, 3) float64
         The rows before the first and after the last one.
-    across : (k,) float64
-        The point before the first one of a row is x_0 + sum of across_k (x_k - x_0), that after the last
-        one alike; empty where rows are closed.
+    beside : (2, r + 2, 3) float64
+        The columns before the first and after the last one, those of the rows of `beyond` too.
     """
 
     beyond: Floats
-    across: Floats
+    beside: Floats
 
 
 @dataclass(frozen=True, eq=False)

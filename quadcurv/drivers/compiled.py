@@ -11,12 +11,12 @@ from functools import partial
 import numpy as np
 import scipy
 
-from quadcurv.boundary import frame, ghosts, with_ghosts
+from quadcurv.boundary import REACH, closed, frame, one_rings, parts_at_poles
 from quadcurv.drivers import direct
 from quadcurv.mesh import QuadGrid, QuadMesh, StaggeredGrid
 from quadcurv.schemes import Diamond, Laplacian
 from quadcurv.stencils import Frame, Stencils
-from quadcurv.types import Floats
+from quadcurv.types import Floats, Indices
 
 # Of one vertex of a face list and of one row of a matrix, in vertices of a grid.
 _RING_WORK, _ROW_WORK = 4, 8
@@ -30,7 +30,7 @@ def evaluate_faces(mesh: QuadMesh, scheme: Laplacian, boundary: str, results: Ma
     others, part = mesh.irregular_part()
     if others.size:
         inner = {name: np.empty(part.shape + direct.PER_VERTEX[name]) for name in results}
-        treated = with_ghosts(part, ghosts(part))[0] if boundary == "extrapolate" else part
+        treated = closed(part)[0] if boundary == "extrapolate" else part
         direct.evaluate(part, treated, scheme, inner)
         for name, values in inner.items():
             results[name][others] = values[: others.size]
@@ -41,18 +41,62 @@ def evaluate_faces(mesh: QuadMesh, scheme: Laplacian, boundary: str, results: Ma
 def evaluate_grid(
     grid: QuadGrid | StaggeredGrid, scheme: Laplacian, boundary: str, results: Mapping[str, Floats]
 ) -> None:
-    """All in one pass, save what is cut off at open sides: from the stencils of two rows along them."""
+    """All in one pass, save along open sides: what is cut off there, and rings that ghosts by index miss."""
     assert scheme.fast is not None
-    _evaluate_rows(grid, scheme.fast, boundary, results)
-    cut = {"dual_areas"} if boundary == "extrapolate" else {"dual_areas", "vertex_normals"}
-    if not cut & results.keys() or (isinstance(grid, StaggeredGrid) and grid.has_ghosts):
+    unserved = _evaluate_rows(grid, scheme.fast, boundary, results)
+    if all(grid.wrap) or (isinstance(grid, StaggeredGrid) and grid.has_ghosts):
         return
+    if unserved.size:
+        _evaluate_part(grid, unserved, scheme, results)
+    if isinstance(grid, QuadGrid):
+        for vertices, part, beside in parts_at_poles(grid):
+            treated = one_rings(part, boundary)
+            _fill(results, vertices[beside], part.stencils(), treated, scheme, np.flatnonzero(beside))
+    cut = {"dual_areas"} if boundary == "extrapolate" else {"dual_areas", "vertex_normals"}
+    if cut & results.keys():
+        _evaluate_sides(grid, scheme, {name: results[name] for name in cut & results.keys()})
+
+
+def _evaluate_part(
+    grid: QuadGrid | StaggeredGrid, others: Indices, scheme: Laplacian, results: Mapping[str, Floats]
+) -> None:
+    """Vertices that the frame of a grid does not serve, from the stencils of a part around them."""
+    from quadcurv.kernels import topology
+
+    given, place = grid.stencils(), others
+    if isinstance(grid, QuadGrid):
+        vertices, faces = topology.part_around(given.faces, others, given.n, REACH)
+        given = Stencils(given.points[vertices], faces, (vertices.size,), given.closed[vertices])
+        treated, place = closed(given)[0], np.arange(others.size)
+    else:
+        treated = one_rings(grid)
+    _fill(results, others, given, treated, scheme, place)
+
+
+def _fill(
+    results: Mapping[str, Floats],
+    vertices: Indices,
+    given: Stencils,
+    treated: Stencils,
+    scheme: Laplacian,
+    place: Indices,
+) -> None:
+    """Give some vertices of a grid the results at some places in other stencils."""
+    inner = {name: np.empty(given.shape + direct.PER_VERTEX[name]) for name in results}
+    direct.evaluate(given, treated, scheme, inner)
+    for name, values in inner.items():
+        rows = (-1, *direct.PER_VERTEX[name])
+        results[name].reshape(rows)[vertices] = values.reshape(rows)[place]
+
+
+def _evaluate_sides(grid: QuadGrid | StaggeredGrid, scheme: Laplacian, results: Mapping[str, Floats]) -> None:
+    """Open sides of the grid as given, from the stencils of two rows along them."""
     for axis in (0, 1):
         if grid.wrap[axis]:
             continue
         for end in (0, -1):
             side = grid.side(axis, end)
-            inner = {name: np.empty(side.shape + direct.PER_VERTEX[name]) for name in cut & results.keys()}
+            inner = {name: np.empty(side.shape + direct.PER_VERTEX[name]) for name in results}
             direct.evaluate(side.stencils(), side.stencils(), scheme, inner)
             for name, values in inner.items():
                 np.moveaxis(results[name], axis, 0)[end] = np.moveaxis(values, axis, 0)[end]
@@ -60,15 +104,16 @@ def evaluate_grid(
 
 def _evaluate_rows(
     grid: QuadGrid | StaggeredGrid, diamond_of: Diamond, boundary: str, results: Mapping[str, Floats]
-) -> None:
+) -> Indices:
+    """Run a pass over a grid; the border vertices that its frame does not serve."""
     from quadcurv.kernels import cells, ranges, rows
     from quadcurv.kernels.compiled import flat
 
     wanted, liu = _wanted(results), diamond_of.area == "quads"
     r, c = grid.shape
     if isinstance(grid, QuadGrid):
-        around = _around(grid.points, frame(grid, boundary))
-        kernel = partial(rows.grid_curvatures, flat(grid.points), 3 * c, *around, liu, *wanted)
+        around, unserved = frame(grid, boundary)
+        kernel = partial(rows.grid_curvatures, flat(grid.points), 3 * c, *map(flat, around), liu, *wanted)
     else:
         dual = grid.dual
         for axis in (0, 1):
@@ -76,40 +121,23 @@ def _evaluate_rows(
             if grid.wrap[axis] and not np.array_equal(first, last):  # the seam is that of the first
                 dual = dual.copy()
                 np.moveaxis(dual, axis, 0)[-1] = first
-        points, size = flat(grid.primal), 3 * c
+        points, size, unserved = flat(grid.primal), 3 * c, np.empty(0, np.int64)
         if grid.has_ghosts:
             sides, size = grid.primal, 3 * (c + 2)
-            around = flat(sides[[0, -1], 1:-1]), flat(np.moveaxis(sides[:, [0, -1]], 1, 0))
+            around = Frame(sides[[0, -1], 1:-1], np.moveaxis(sides[:, [0, -1]], 1, 0))
             points = points[size + 3 :]
         else:
-            around = _around(grid.primal, frame(grid, boundary))
-        kernel = partial(cells.staggered_curvatures, points, size, *around, flat(dual), liu, *wanted)
+            around, unserved = frame(grid, boundary)
+        kernel = partial(
+            cells.staggered_curvatures, points, size, *map(flat, around), flat(dual), liu, *wanted
+        )
     ranges.over(kernel, r, r * c, rows.LEAST_ROWS)
+    return unserved
 
 
 def _wanted(results: Mapping[str, Floats]) -> list[Floats]:
     """Results in the order of kernels, each of one dimension; of size 0 where nobody asks."""
     return [results[name].ravel() if name in results else np.empty(0) for name in _RESULTS]
-
-
-def _around(points: Floats, frame: Frame) -> tuple[Floats, Floats]:
-    """Rows before and after the first and last one of a grid; columns beside all of these."""
-    from quadcurv.kernels.compiled import flat
-
-    beyond, across = frame.beyond.reshape(2, -1, 3), frame.across
-
-    def columns(k: int) -> Floats:
-        """The k-th from either side."""
-        sides = [k, points.shape[1] - 1 - k]
-        return np.concatenate((beyond[:1, sides], points[:, sides], beyond[1:, sides]))
-
-    if across.size == 0:
-        return flat(frame.beyond), flat(np.empty(0))
-    near = columns(0)
-    beside = near.copy()
-    for k, weight in enumerate(across):
-        beside += weight * (columns(k) - near)
-    return flat(frame.beyond), flat(np.moveaxis(beside, 1, 0))
 
 
 def _evaluate_rings(mesh: QuadMesh, diamond_of: Diamond, results: Mapping[str, Floats]) -> None:

@@ -8,14 +8,14 @@ Elsewhere a neighbourhood ends at the border and a fit is one-sided.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import fields
+from dataclasses import fields, replace
 from functools import cached_property
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import scipy
 
-from quadcurv.boundary import checked_boundary, ghost_layer, ghosts, with_ghosts
+from quadcurv.boundary import REACH, checked_boundary, fitted, ghost_layer, ghosts, mirrored
 from quadcurv.mesh import Mesh, QuadGrid, QuadMesh, StaggeredGrid
 from quadcurv.schemes import Curvatures, Fit, StandardErrors
 from quadcurv.stencils import Stencils
@@ -39,6 +39,8 @@ def fit_around(around: MeshNeighbourhoods, scheme: Fit) -> Curvatures:
         raise ValueError(
             f"{scheme.name}: its fit gave H of shape {found.mean.shape}, expected {around.wanted.shape}"
         )
+    if found.standard_error is not None:
+        found = _with_border_errors(found, around.border_error, around.border_noise)
     unknown = ~around.wanted
     if unknown.any():
         found = each(found, lambda values: _masked(values, unknown))
@@ -55,26 +57,24 @@ class MeshNeighbourhoods:
         self.mesh, self.boundary = mesh, boundary
         self.stencils, self.present = _stencils(mesh)
         self.wanted = self.present & self.stencils.closed if boundary == "nan" else self.present
+        # Standard error of H and noise by surfaces fitted at the border: points read off these show none.
+        self.border_error, self.border_noise = np.full((2, self.stencils.n), np.nan)
 
     def polynomials(self, vertices: Indices, degree: int, rings: int, ghosts: bool = True) -> Floats:
         """(k, COLUMNS): see `Neighbourhoods`."""
         out = (self._windows or self._faces).polynomials(vertices, degree, rings)
-        continued = self._continued(rings) if ghosts else None
-        if continued is not None:
-            faces, place = continued
+        for faces, place, reach in self._beyond(rings) if ghosts else ():
             at = place[vertices]
-            out[at >= 0] = faces.polynomials(at[at >= 0], degree, rings)
+            out[at >= 0] = faces.polynomials(at[at >= 0], degree, reach)
         return out
 
     def positions(self, vertices: Indices, rings: int) -> tuple[Floats, Floats]:
         """(k, m, 3) and (k, 3): see `Neighbourhoods`."""
         out, normals = self._faces.positions(vertices, rings), self._faces.normals[vertices]
-        continued = self._continued(rings)
-        if continued is not None:
-            faces, place = continued
+        for faces, place, reach in self._beyond(rings):
             at = place[vertices]
             kept = at >= 0
-            out = _replaced(out, kept, faces.positions(at[kept], rings))
+            out = _replaced(out, kept, faces.positions(at[kept], reach))
             normals[kept] = faces.normals[at[kept]]
         return out, normals
 
@@ -105,21 +105,35 @@ class MeshNeighbourhoods:
             return _GridNeighbourhoods(self.mesh, self.stencils)
         return None
 
-    def _continued(self, layers: int) -> tuple[_FaceNeighbourhoods, Indices] | None:
-        """The mesh near its border with ghosts, and places there of vertices whose ghosts are all smooth."""
-        if (
-            self.boundary == "nan"
-            or layers > _GHOST_LAYERS
-            or isinstance(self.mesh, StaggeredGrid)
-            or self.stencils.closed.all()
-        ):
-            return None
-        if layers not in self._ghosted:
-            self._ghosted[layers] = _continued(self.stencils, layers)
-        return self._ghosted[layers]
+    def _beyond(self, rings: int) -> list[_Beyond]:
+        """What takes the place of neighbourhoods over so many rings that would end at the border."""
+        if self.boundary == "nan" or rings > _GHOST_LAYERS or self.stencils.closed.all():
+            return []
+        if rings not in self._replaced:
+            cells = isinstance(self.mesh, StaggeredGrid)
+            self._replaced[rings] = [] if cells else _continued(self.stencils, rings)
+            left = self.present & ~self.stencils.closed
+            for replaced in self._replaced[rings]:
+                left &= replaced.place < 0
+            self._replaced[rings] += self._mirrored(np.flatnonzero(left), rings)
+        return self._replaced[rings]
+
+    def _mirrored(self, vertices: Indices, rings: int) -> list[_Beyond]:
+        """Neighbourhoods completed by points of fitted surfaces, as stencils that lead to these points."""
+        surfaces = fitted(self.stencils, vertices)
+        rows = np.flatnonzero(np.isfinite(surfaces.error))
+        if rows.size == 0:
+            return []
+        vertices, surfaces = vertices[rows], surfaces.of(rows)
+        self.border_error[vertices] = surfaces.noise * surfaces.gain
+        self.border_noise[vertices] = surfaces.noise
+        points = mirrored(self.stencils, surfaces, rings)
+        place = np.full(self.stencils.n, -1)
+        place[vertices] = np.arange(vertices.size)
+        return [_Beyond(_FaceNeighbourhoods(_bundles(points), surfaces.frames[:, 2]), place, 1)]
 
     @cached_property
-    def _ghosted(self) -> dict[int, tuple[_FaceNeighbourhoods, Indices] | None]:
+    def _replaced(self) -> dict[int, list[_Beyond]]:
         return {}
 
 
@@ -144,14 +158,14 @@ class _GridNeighbourhoods:
 class _FaceNeighbourhoods:
     """Rings of faces."""
 
-    def __init__(self, stencils: Stencils) -> None:
+    def __init__(self, stencils: Stencils, normals: Floats | None = None) -> None:
         from quadcurv.kernels import topology
 
         self.stencils = stencils
         self.corners = topology.corners_by_vertex(stencils.faces, len(stencils.points))
+        self.normals = self._ring_normals() if normals is None else normals
 
-    @cached_property
-    def normals(self) -> Floats:
+    def _ring_normals(self) -> Floats:
         """(n, 3): normals of the rings; where the polygon around a vertex has no area its neighbours'."""
         stencils, (indptr, corners) = self.stencils, self.corners
         normals = stencils.ring_areas
@@ -203,37 +217,54 @@ class _FaceNeighbourhoods:
         return out
 
 
-def _continued(stencils: Stencils, layers: int) -> tuple[_FaceNeighbourhoods, Indices] | None:
+class _Beyond(NamedTuple):
+    """Neighbourhoods that go on beyond the border, `reach` rings of faces, and the places of vertices in them."""
+
+    faces: _FaceNeighbourhoods
+    place: Indices
+    reach: int
+
+
+def _continued(stencils: Stencils, layers: int) -> list[_Beyond]:
+    """The mesh near its border with ghosts, for vertices whose ghosts are all smooth."""
     from quadcurv.kernels import topology
 
     border = np.flatnonzero(~stencils.closed)
-    kept, faces = topology.part_around(stencils.faces, border, stencils.n, _GHOST_DEGREE)
+    kept, faces = topology.part_around(stencils.faces, border, stencils.n, REACH)
     closed = stencils.closed[kept]
     part = Stencils(stencils.points[kept], faces, closed.shape, closed, stencils.orientable)
     layer = ghosts(part, _GHOST_DEGREE, layers)
     if layer.quads.size == 0:
-        return None
-    ghosted, rough = with_ghosts(part, layer)
-    near = np.arange(rough.size) >= part.n
-    # Ghosts err by some ten times their roughness, one-sided fits by some ten times the turn's third power.
-    bad = rough > _turn(part) ** 3
-    corners = np.where(ghosted.faces < 0, ghosted.faces[:, :1], ghosted.faces)
+        return []
+    points = np.concatenate((part.points, layer.points))
+    faces = np.concatenate((part.faces, layer.quads))
+    unsure = np.flatnonzero(np.isfinite(layer.error) & ~layer.smooth)
+    closed = part.closed | layer.smooth
+    closed[unsure] = layer.error[unsure] <= fitted(part, unsure).error
+    ghosted = Stencils(points, faces, part.shape, closed, part.orientable)
+    near = np.arange(len(points)) >= part.n
+    bad = np.zeros(len(points), bool)
+    corners = np.where(faces < 0, faces[:, :1], faces)
     for _ in range(layers):
         for mark in (near, bad):
             mark[corners[mark[corners].any(axis=1)]] = True
-        bad[: part.n] |= ~ghosted.closed  # beside these, ghosts are missing
+        bad[: part.n] |= ~closed  # beside these, ghosts are missing
     chosen = np.flatnonzero((near & ~bad)[: part.n])
     place = np.full(stencils.n, -1)
     place[kept[chosen]] = chosen
-    return _FaceNeighbourhoods(ghosted), place
+    return [_Beyond(_FaceNeighbourhoods(ghosted), place, layers)]
 
 
-def _turn(mesh: Stencils) -> float:
-    """Sine of the angle by which the normal turns across a face, on average."""
-    size = np.linalg.norm(mesh.ring_areas, axis=1, keepdims=True)
-    normals = np.divide(mesh.ring_areas, size, out=np.zeros_like(mesh.ring_areas), where=size > 0)
-    ends = normals[mesh.faces[:, 0]], normals[mesh.faces[:, 2]]
-    return float(np.linalg.norm(np.cross(*ends), axis=1).mean())
+def _bundles(points: Floats) -> Stencils:
+    """Faces that lead from the first of each (k, m, 3) points to its others, and nowhere else."""
+    k, m, _ = points.shape
+    index = np.where(np.isnan(points[:, 1:, 0]), -1, np.arange(k * (m - 1)).reshape(k, m - 1) + k)
+    index = np.pad(index, [(0, 0), (0, -(m - 1) % 3)], constant_values=-1).reshape(k, -1, 3)
+    faces = np.concatenate(
+        (np.broadcast_to(np.arange(k)[:, None, None], (*index.shape[:2], 1)), index), axis=2
+    )
+    flat = np.concatenate((points[:, 0], np.nan_to_num(points[:, 1:]).reshape(-1, 3)))
+    return Stencils(flat, faces.reshape(-1, 4).astype(np.int32), (k,), np.ones(k, bool))
 
 
 def _stencils(mesh: Mesh) -> tuple[Stencils, Bools]:
@@ -291,6 +322,20 @@ def each(found: Curvatures, change: Callable[[Any], Any]) -> Curvatures:
         elif value is not None:
             values[name] = change(value)
     return Curvatures(**values)
+
+
+def _with_border_errors(found: Curvatures, error: Floats, noise: Floats) -> Curvatures:
+    """Curvatures with the errors of the surfaces that their neighbourhoods were completed from."""
+    assert found.standard_error is not None
+    own = found.standard_error.mean
+    larger = error > own
+    factor = np.divide(error, own, out=np.ones_like(own), where=larger & (own > 0))
+    errors = StandardErrors(*(e * factor for e in found.standard_error))
+    return replace(
+        found,
+        standard_error=errors,
+        noise=None if found.noise is None else np.where(larger, noise, found.noise),
+    )
 
 
 def _masked(values: Any, unknown: Bools) -> Any:

@@ -140,7 +140,7 @@ class QuadMesh:
     def irregular_part(self) -> tuple[Indices, Stencils]:
         """Vertices without a regular ring, and the stencils of a part of the mesh around them.
 
-        The first vertices of the part are these; it reaches four faces beyond them, so that they have there
+        The first vertices of the part are these; it reaches five faces beyond them, so that they have there
         all that a ghost layer or a scheme may look at.
         """
         c = self.connectivity

@@ -1,0 +1,147 @@
+"""Rings at the border, closed.
+
+A vertex at the border has a ring that is open: a scheme knows nothing there until points beyond the border, ghosts,
+close it. With boundary="extrapolate" they come, in this order of preference,
+
+1. by index: the strips of quads inward from the border are continued by the quartic through five points,
+   X_-1 = 5 X_0 - 10 X_1 + 10 X_2 - 5 X_3 + X_4, where the points are smooth functions of their index. The border
+   then has the order and the error of the inside;
+2. by arc length: the same on cumulative chord lengths, where the spacing is not smooth but the lines are;
+3. from a surface: where the strips are rough (a position is off by more than the extrapolation bears), too
+   short, or not to be traced (triangles, extraordinary vertices, re-entrant corners), or where their ghosts do
+   not lie outside, the ghosts are read off a polynomial surface fitted at the vertex.
+
+Open stay, and have no curvature: isolated vertices, those of several fans of faces or of an edge of more than two,
+and those whose neighbours are too few for a surface.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from quadcurv.boundary.closing import EXTRAPOLATED, FITTED, INTERIOR, OPEN, REACH, closed
+from quadcurv.boundary.mirror import mirrored
+from quadcurv.boundary.poles import closed_grid, parts_at_poles, poles
+from quadcurv.boundary.sides import cell_ghosts, frame, ghost_layer
+from quadcurv.boundary.strips import ghosts
+from quadcurv.boundary.surface import fitted
+from quadcurv.mesh import Mesh, QuadGrid, StaggeredGrid
+from quadcurv.stencils import Stencils
+from quadcurv.types import Floats
+
+__all__ = [
+    "BOUNDARIES",
+    "EXTRAPOLATED",
+    "FITTED",
+    "INTERIOR",
+    "OPEN",
+    "REACH",
+    "boundary_treatment",
+    "checked_boundary",
+    "closed",
+    "fitted",
+    "frame",
+    "ghost_layer",
+    "ghosts",
+    "mirrored",
+    "one_rings",
+    "parts_at_poles",
+    "roughness",
+]
+
+BOUNDARIES = ("extrapolate", "nan")
+
+
+def checked_boundary(boundary: str) -> str:
+    """The treatment of the boundary by name, if there is one of that name."""
+    if boundary not in BOUNDARIES:
+        raise ValueError(f"boundary: expected one of {BOUNDARIES}, got {boundary!r}")
+    return boundary
+
+
+def one_rings(mesh: Mesh, boundary: str = "extrapolate") -> Stencils:
+    """One-ring stencils of a mesh, its boundary treated.
+
+    Parameters
+    ----------
+    mesh : QuadMesh, QuadGrid or StaggeredGrid
+    boundary : {"extrapolate", "nan"}
+        "extrapolate" closes rings at the boundary by ghosts, see :mod:`quadcurv.boundary`. "nan" leaves them
+        open: their curvature is NaN.
+
+    Returns
+    -------
+    Stencils
+
+    Raises
+    ------
+    ValueError
+        Unknown boundary.
+    """
+    return _treated(mesh, boundary)[0]
+
+
+def boundary_treatment(mesh: Mesh, boundary: str = "extrapolate") -> NDArray[np.uint8]:
+    """What closes the ring of every vertex.
+
+    Parameters
+    ----------
+    mesh, boundary
+        As for :func:`one_rings`.
+
+    Returns
+    -------
+    (n,) or (r, c) uint8
+        ``INTERIOR`` (1): faces of the mesh, or ghost cells that it came with. ``EXTRAPOLATED`` (2): ghosts on
+        polynomials through strips. ``FITTED`` (3): ghosts on a fitted surface. ``OPEN`` (0): nothing, and the
+        curvature is NaN; isolated vertices too.
+
+    Raises
+    ------
+    ValueError
+        As for :func:`one_rings`.
+    """
+    return mesh.in_shape(_treated(mesh, boundary)[1])
+
+
+def _treated(mesh: Mesh, boundary: str) -> tuple[Stencils, NDArray[np.uint8]]:
+    checked_boundary(boundary)
+    if isinstance(mesh, QuadGrid) and mesh.mask is not None:
+        mesh = mesh.to_mesh()
+    found = poles(mesh) if isinstance(mesh, QuadGrid) else []
+    given = mesh.stencils()
+    if found:
+        treated, treatment = closed_grid(mesh, found)
+        if boundary == "nan":
+            treatment = np.where(given.closed, treatment, OPEN).astype(np.uint8)
+            treated = replace(treated, closed=treatment != OPEN)
+        return treated, treatment
+    if boundary == "nan" or (isinstance(mesh, StaggeredGrid) and mesh.has_ghosts):
+        return given, np.where(given.closed, INTERIOR, OPEN).astype(np.uint8)
+    if not isinstance(mesh, StaggeredGrid):
+        return closed(given)
+    return _ghosted_cells(mesh)
+
+
+def _ghosted_cells(grid: StaggeredGrid) -> tuple[Stencils, NDArray[np.uint8]]:
+    centres, rough = cell_ghosts(grid)
+    r, c = grid.shape
+    index = np.full((r + 2, c + 2), -1, np.int32)
+    index[1:-1, 1:-1] = np.arange(r * c).reshape(r, c)
+    for axis in (0, 1):
+        if grid.wrap[axis]:
+            np.moveaxis(index, axis, 0)[[0, -1]] = np.moveaxis(index, axis, 0)[[-2, 1]]
+    known = (index < 0) & np.isfinite(centres).all(axis=2)
+    index[known] = np.arange(r * c, r * c + np.count_nonzero(known))
+    treated = grid.diamonds(index, centres[known])
+    closes = np.where(rough.ravel(), FITTED, EXTRAPOLATED)
+    treatment = np.where(grid.stencils().closed, INTERIOR, np.where(treated.closed, closes, OPEN))
+    return treated, treatment.astype(np.uint8)
+
+
+def roughness(mesh: Mesh) -> Floats:
+    """To be written."""
+    raise NotImplementedError

@@ -1,0 +1,176 @@
+"""Lines of points that end at the border, continued by ghosts; and how far these are off.
+
+A polynomial through the first points of a line X_0, X_1, ... is read off beyond X_0: by index, X_-1 = 5 X_0 -
+10 X_1 + 10 X_2 - 5 X_3 + X_4, where the points are smooth functions of their index, else by arc length, on
+cumulative chord lengths, at the mirror images of X_1, X_2. What a sixth point would change tells the error. It is
+clearly less than what the fifth has changed where the line is smooth, twice as much where there is noise.
+"""
+
+from __future__ import annotations
+
+from math import comb
+from typing import NamedTuple
+
+import numpy as np
+
+from quadcurv.types import Bools, Floats, Indices
+
+NODES = 6  # of a line; the last one may be missing
+SMOOTH = 0.15  # squares of what the last two points change, on a line and those beside it
+# Where the last point changes less than the last but one, there is little noise: then what a fitted surface
+# leaves at the points is but a third of what it misses beyond the border. Squares, again.
+_CALM, _FAITHFUL = 0.6, 0.1
+ROUNDING = 2.0**-92  # of coordinates, as extrapolation magnifies it; squares, too
+
+
+class Continued(NamedTuple):
+    """Lines with ghosts.
+
+    Attributes
+    ----------
+    ghosts : (k, layers, 3) float64
+    error : (k,) float64
+        Their estimated error, infinite where they do not lie outside.
+    smooth, even : (k,) bool
+        Whether the points are smooth functions of length, or of their index, beyond doubt.
+    """
+
+    ghosts: Floats
+    error: Floats
+    smooth: Bools
+    even: Bools
+
+
+def index_weights(degree: int, layer: int = 1) -> Floats:
+    """Lagrange polynomials of the nodes 0, ..., degree at -layer."""
+    return np.array(
+        [(-1.0) ** k * comb(degree + layer, degree - k) * comb(layer + k - 1, k) for k in range(degree + 1)]
+    )
+
+
+def extended(
+    lines: Floats, normals: Floats, turn: Floats, degree: int, layers: int, beside: Indices
+) -> Continued:
+    """Continue lines by ghosts.
+
+    Parameters
+    ----------
+    lines : (k, 6, 3) float64
+        Points from the border inward; NaN for a sixth one that is missing, if the degree is 4.
+    normals : (k, 3) float64
+        Unit normals of the surface at X_0.
+    turn : (k,) float64
+        Sine of the angle by which they turn from there to the next points.
+    degree, layers : int
+        Of the polynomial; how many ghosts beyond it.
+    beside : (m, 2) int64
+        Lines that end beside each other.
+    """
+    x = lines - lines[:, :1]  # an offset costs no digits
+    floor = ROUNDING * (np.square(lines[:, 0]) + np.square(x[:, 4] + lines[:, 0])).sum(axis=1)
+    terms = [np.einsum("j,kjx->kx", w, x[:, : w.size]) for w in _DIFFERENCES]
+    every = np.ones(len(lines), bool)
+    ghosts = continued(lines[:, : degree + 1], layers, every)
+    error, even = _error(terms, ghosts - lines[:, :1], x, normals, turn, floor, beside, degree)
+    if even.all():
+        return Continued(ghosts, error, even, even)
+    s, table = _newton(x)
+    terms = [table[:, k] * np.prod(_beyond(s, 0)[:, None] - s[:, :k], axis=1) for k in (3, 4, 5)]
+    by_length = continued(lines[:, : degree + 1], layers, ~every)
+    other, smooth = _error(terms, by_length - lines[:, :1], x, normals, turn, floor, beside, degree)
+    by_index = even | (~smooth & (error <= other))
+    ghosts = np.where(by_index[:, None, None], ghosts, by_length)
+    return Continued(ghosts, np.where(by_index, error, other), even | smooth, even)
+
+
+def continued(lines: Floats, layers: int, even: Bools) -> Floats:
+    """Ghosts (k, layers, ..., 3) on the polynomials through lines (k, degree + 1, ..., 3): by index if even."""
+    degree = lines.shape[1] - 1
+    x = lines - lines[:, :1]
+    weights = np.stack([index_weights(degree, m + 1) for m in range(layers)])
+    ghosts = np.einsum("lj,kj...->kl...", weights, x)
+    if not even.all():
+        at = ~even
+        s, table = _newton(x[at])
+        ghosts[at] = np.stack([_value(s, table, _beyond(s, m)) for m in range(layers)], axis=1)
+    return lines[:, :1] + ghosts
+
+
+_DIFFERENCES = [np.array([(-1.0) ** j * comb(order, j) for j in range(order + 1)]) for order in (3, 4, 5)]
+
+
+def _error(
+    terms: list[Floats],
+    ghosts: Floats,
+    x: Floats,
+    normals: Floats,
+    turn: Floats,
+    floor: Floats,
+    beside: Indices,
+    degree: int,
+) -> tuple[Floats, Bools]:
+    """Estimated error of ghosts, relative to X_0, and whether they are smooth beyond doubt."""
+    third, fourth, fifth = (np.einsum("kx,kx->k", d, d) for d in terms)
+    short = np.isnan(fifth)
+    last, before = np.where(short, fourth, fifth), np.where(short, third, fourth)
+    with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
+        steps = np.diff(ghosts, axis=1, prepend=0.0)
+        outward = -np.einsum("klx,kx->kl", steps, x[:, 1])
+        edge = np.einsum("kx,kx->k", x[:, 1], x[:, 1])
+        outside = (outward[:, 0] > 0.2 * edge) & (outward > 0).all(axis=1)
+        outside &= np.einsum("kx,kx->k", ghosts[:, 0], ghosts[:, 0]) < 4 * edge
+        smooth = without_excess(np.where(outside, last - SMOOTH * before - floor, np.inf), beside)
+        # Along the surface an error does harm by as much as the surface turns from point to point.
+        term = np.where(short[:, None], terms[1], terms[2])
+        off = np.einsum("kx,kx->k", term, normals) ** 2 + turn**2 * np.einsum("kx,kx->k", term, term)
+        last, before = _around(last, beside), _around(before, beside)
+        square = _around(off, beside) * np.where(last < _CALM * before, _FAITHFUL, 1.0)
+        if degree > 4:
+            square *= np.minimum(1, last / before)
+    return np.where(outside & ~np.isnan(square), np.sqrt(square), np.inf), smooth
+
+
+def without_excess(excess: Floats, beside: Indices) -> Bools:
+    """Where the last point changes no more than it may, of a line and those around it together."""
+    return _around(excess, beside) <= 0
+
+
+def _around(values: Floats, beside: Indices) -> Floats:
+    """Mean of the values of a line and, with less weight, of two lines on either side."""
+    weights = np.ones_like(values)
+    for _ in range(2):
+        values, weights = (_sum_beside(x, beside) for x in (values, weights))
+    return values / weights
+
+
+def _sum_beside(values: Floats, beside: Indices) -> Floats:
+    total = values.copy()
+    np.add.at(total, beside[:, 0], values[beside[:, 1]])
+    np.add.at(total, beside[:, 1], values[beside[:, 0]])
+    return total
+
+
+def _newton(x: Floats) -> tuple[Floats, Floats]:
+    """Cumulative chord lengths (k, j, ..., 1) and divided differences (k, j, ..., 3) of lines."""
+    chord = np.linalg.norm(np.diff(x, axis=1), axis=-1, keepdims=True)
+    s = np.concatenate((np.zeros_like(chord[:, :1]), np.cumsum(chord, axis=1)), axis=1)
+    table = x.copy()
+    with np.errstate(divide="ignore", invalid="ignore"):
+        for m in range(1, x.shape[1]):
+            table[:, m:] = (table[:, m:] - table[:, m - 1 : -1]) / (s[:, m:] - s[:, :-m])
+    return s, table
+
+
+def _beyond(s: Floats, layer: int) -> Floats:
+    """Where ghosts are: at the mirror images of points, but no further than the second edge is long."""
+    first, second = s[:, 1], s[:, 2] - s[:, 1]
+    step = np.divide(second, first, out=np.ones_like(first), where=second < first)
+    return -step * s[:, layer + 1]
+
+
+def _value(s: Floats, table: Floats, at: Floats) -> Floats:
+    """Polynomials with divided differences (k, j, ..., 3) at lengths (k, ..., 1)."""
+    value = np.zeros_like(table[:, 0])
+    for j in range(table.shape[1] - 1, -1, -1):
+        value = table[:, j] + (at - s[:, j]) * value
+    return value

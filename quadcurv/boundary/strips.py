@@ -1,0 +1,177 @@
+"""Strips of quads inward from the border of a face list, and the quads of ghosts that continue them.
+
+The two sides of a strip run X_0, ..., X_5 straight through X_1, ..., X_4, which must be regular: four quads
+around, or two on the border; the sixth point may be missing for a quartic. At a corner, a border vertex of one
+quad, the ghosts of its two sides are extrapolated once more to the point across. A face list of a grid thus
+gets the ghosts of the grid.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from quadcurv.boundary.lines import NODES, continued, extended
+from quadcurv.stencils import Stencils, face_pairs
+from quadcurv.types import Bools, Floats, Indices
+
+
+_CORNER = 8.0  # what extrapolating once more makes of errors
+
+
+class Ghosts(NamedTuple):
+    """Ghosts beyond the border of a face list, wherever its strips are long enough.
+
+    Attributes
+    ----------
+    points : (g, 3) float64
+    quads : (k, 4) int32
+        Ghost quads over the n vertices and, from n on, the ghosts.
+    error : (n,) float64
+        The estimated error of the ghosts around a border vertex; infinite where they do not close its ring.
+    smooth : (n,) bool
+        Whether they close it and are right beyond doubt.
+    """
+
+    points: Floats
+    quads: NDArray[np.int32]
+    error: Floats
+    smooth: Bools
+
+
+def ghosts(mesh: Stencils, degree: int = 4, layers: int = 1) -> Ghosts:
+    """Continue the strips inward from border edges by `layers` ghosts on polynomials of a degree."""
+    n = mesh.n
+    rails, slot, valence, n_edges = _strips(mesh, degree + 1)
+    if len(rails) == 0:
+        return Ghosts(np.empty((0, 3)), np.empty((0, 4), np.int32), np.full(n, np.inf), np.zeros(n, bool))
+    # One line for each rail X_0, X_1, ...: at a side the strips to the left and right share it.
+    long_first = np.argsort(rails[:, -1] < 0, kind="stable")
+    key = rails[long_first, 0] * n + rails[long_first, 1]
+    _, first, line = np.unique(key, return_index=True, return_inverse=True)
+    lines, line = rails[long_first[first]], line[np.argsort(long_first)]
+    x = np.where(lines[..., None] >= 0, mesh.points[lines], np.nan)
+    normals, turn = _normals(mesh)
+    at = lines[:, 0]
+    beside = extended(x, normals[at], turn[at], degree, layers, line.reshape(-1, 2))
+    outward = np.concatenate((rails[:, :1], n + layers * line[:, None] + np.arange(layers)), axis=1)
+    quads = _block_quads(outward.reshape(-1, 2, layers + 1).transpose(0, 2, 1)[..., ::-1], slot)
+
+    both = np.bincount(rails[:, 0], minlength=n) == 2
+    side = both & (valence == 2) & (n_edges == 2)
+    corner = both & (valence == 1)
+    # At a corner one strip begins and another ends: the rail of each runs along the edges of the other.
+    at = np.flatnonzero(corner[rails[:, 0]])
+    at = at[np.lexsort((at % 2, rails[at, 0]))]
+    across, known = _beside(rails, line, rails[at, : degree + 1], n)
+    known = known[::2] & known[1::2]
+    across, (begin, end) = across[np.repeat(known, 2)], at.reshape(-1, 2)[known].T
+    c = rails[begin, 0]
+    block = np.empty((c.size, layers + 1, layers + 1), np.int64)
+    block[:, :, 0], block[:, 0, :] = outward[begin], outward[end]
+    number = n + layers * len(lines) + np.arange(c.size * layers**2)
+    block[:, 1:, 1:] = number.reshape(-1, layers, layers)
+    corner_quads = _block_quads(block, slot[begin // 2])
+
+    all_even = beside.even[across].all(axis=1).reshape(-1, 2).all(axis=1)
+    beyond = continued(beside.ghosts[across], layers, np.repeat(all_even, 2))  # (2 h, layers, layers, 3)
+    points = (beyond[::2] + beyond[1::2].swapaxes(1, 2)) / 2
+
+    # The lines of a vertex and of those beside it; of a corner, those that its ghost reads.
+    error, smooth = np.zeros(n), np.ones(n, bool)
+    np.maximum.at(error, rails[:, 0], beside.error[line].reshape(-1, 2).max(axis=1).repeat(2))
+    smooth[rails[~beside.smooth[line].reshape(-1, 2).all(axis=1).repeat(2), 0]] = False
+    closed = side
+    error[c] = _CORNER * beside.error[across].max(axis=1).reshape(-1, 2).max(axis=1)
+    smooth[c] = beside.smooth[across].all(axis=1).reshape(-1, 2).all(axis=1)
+    closed[c] = True
+    ghosts = np.concatenate((beside.ghosts.reshape(-1, 3), points.reshape(-1, 3)))
+    error[~closed] = np.inf
+    return Ghosts(ghosts, np.concatenate((quads, corner_quads)), error, smooth & closed)
+
+
+def _normals(mesh: Stencils) -> tuple[Floats, Floats]:
+    """Unit normals, and the sine of the angle by which they turn along or across the faces around."""
+    size = np.linalg.norm(mesh.ring_areas, axis=1, keepdims=True)
+    normals = np.divide(mesh.ring_areas, size, out=np.zeros_like(mesh.ring_areas), where=size > 0)
+    turn = np.zeros(mesh.n)
+    faces = np.where(mesh.faces < 0, mesh.faces[:, :1], mesh.faces)
+    for step in (1, 2):
+        other = np.roll(faces, step, axis=1)
+        angle = np.linalg.norm(np.cross(normals[faces], normals[other]), axis=2)
+        np.maximum.at(turn, faces, angle)
+        np.maximum.at(turn, other, angle)
+    return normals, turn
+
+
+def _block_quads(blocks: Indices, slot: Indices) -> NDArray[np.int32]:
+    """Quads of blocks (k, p, q) of vertices, outward from [0, 0].
+
+    Each begins where the block's face does, moved outward: a fixed diagonal goes on in the ghosts.
+    """
+    b = blocks.astype(np.int32)
+    quads = np.stack((b[:, 1:, 1:], b[:, 1:, :-1], b[:, :-1, :-1], b[:, :-1, 1:]), axis=-1)
+    turned = (np.arange(4) - slot[:, None]) % 4
+    return np.take_along_axis(quads, turned[:, None, None], axis=3).reshape(-1, 4)
+
+
+def _beside(rails: Indices, line: Indices, along: Indices, n: int) -> tuple[Indices, Bools]:
+    """Lines of ghosts beside vertices `along` a side, as the strips there have them; whether all exist."""
+    key = rails[:, 0] * n + rails[:, 0].reshape(-1, 2)[:, ::-1].ravel()
+    order = np.argsort(key)
+    wanted = along * n + along[:, [1, *range(along.shape[1] - 1)]]
+    place = order[np.minimum(np.searchsorted(key, wanted, sorter=order), key.size - 1)]
+    return line[place], (key[place] == wanted).all(axis=1)
+
+
+def _strips(mesh: Stencils, least: int) -> tuple[Indices, Indices, Indices, Indices]:
+    """Strips of quads inward from border edges, straight through regular vertices.
+
+    Returns
+    -------
+    rails : (2 k, NODES) int64
+        The two sides of each strip; its first face runs from the first one to the second. -1 for the last
+        points, if there are at least `least`.
+    slot : (k,) int64
+        Where the boundary edge begins in that face.
+    valence, n_edges : (n,) int64
+        Number of faces and of boundary edges at each vertex.
+    """
+    from quadcurv.kernels import topology
+
+    faces, n = mesh.faces, mesh.n
+    border = np.flatnonzero(~mesh.closed[faces].all(axis=1))
+    sides = np.where(faces[border, 3] < 0, 3, 4)
+    outer = np.arange(4) < sides[:, None]
+    f, i, g, j = face_pairs(faces[border])
+    outer[f, i] = outer[g, j] = False
+    near, i = np.nonzero(outer)
+    f, j = border[near], (i + 1) % sides[near]
+    # An edge with an end inside is none: its other face is not among those at the border.
+    kept = ~mesh.closed[faces[f, i]] & ~mesh.closed[faces[f, j]]
+    n_edges = np.bincount(np.concatenate((faces[f, i][kept], faces[f, j][kept])), minlength=n)
+
+    indptr, corners = topology.corners_by_vertex(faces, n)
+    valence = np.diff(indptr)
+    regular = valence == np.where(mesh.closed, 4, 2)
+    regular[faces[faces[:, 3] < 0, :3]] = False
+    kept &= faces[f, 3] >= 0
+    f, i, j = f[kept], i[kept], j[kept]
+    slot = i
+    strips = np.full((f.size, 2, NODES), -1)
+    strips[:, 0, 0], strips[:, 1, 0] = faces[f, i], faces[f, j]
+    place = np.arange(f.size)
+    for k in range(1, NODES):
+        i, j = (2 * i - j) % 4, (2 * j - i) % 4  # across the quad, where the edge begins and ends
+        u, v = faces[f, i], faces[f, j]
+        strips[place, 0, k], strips[place, 1, k] = u, v
+        around = corners[np.minimum(indptr[u, None] + np.arange(4), indptr[u + 1, None] - 1)] // 4
+        beyond = (faces[around] == v[:, None, None]).any(axis=2) & (around != f[:, None])
+        kept = regular[u] & regular[v] & beyond.any(axis=1)
+        place, u, v = place[kept], u[kept], v[kept]
+        f = around[kept, beyond[kept].argmax(axis=1)]
+        i, j = (faces[f] == u[:, None]).argmax(axis=1), (faces[f] == v[:, None]).argmax(axis=1)
+    long_enough = strips[:, 0, least - 1] >= 0
+    return strips[long_enough].reshape(-1, NODES), slot[long_enough], valence, n_edges
