@@ -97,7 +97,7 @@ class MeshNeighbourhoods:
 
     @cached_property
     def _faces(self) -> _FaceNeighbourhoods:
-        return _FaceNeighbourhoods(self.stencils)
+        return _FaceNeighbourhoods(self.stencils, present=self.present)
 
     @cached_property
     def _windows(self) -> _GridNeighbourhoods | None:
@@ -156,13 +156,25 @@ class _GridNeighbourhoods:
 
 
 class _FaceNeighbourhoods:
-    """Rings of faces."""
+    """Rings of faces.
 
-    def __init__(self, stencils: Stencils, normals: Floats | None = None) -> None:
+    Rings do not go on through vertices that are not `present`: beyond those of several fans, or of an edge of
+    more than two faces, lies another sheet.
+    """
+
+    def __init__(
+        self, stencils: Stencils, normals: Floats | None = None, present: Bools | None = None
+    ) -> None:
         from quadcurv.kernels import topology
 
         self.stencils = stencils
         self.corners = topology.corners_by_vertex(stencils.faces, len(stencils.points))
+        if present is not None and not present.all():
+            indptr, corners = self.corners
+            size = np.diff(indptr)
+            seen = np.append(present, np.ones(size.size - present.size, bool))
+            starts = np.cumsum(np.where(seen, size, 0))
+            self.corners = np.concatenate(([0], starts)), corners[np.repeat(seen, size)]
         self.normals = self._ring_normals() if normals is None else normals
 
     def _ring_normals(self) -> Floats:

@@ -22,6 +22,7 @@ from quadcurv.kernels.formulas import formula, real, root, span, where
 from quadcurv.kernels.vector import cross, less, triple
 
 LANES = 48
+CROWDED = 64  # faces of a vertex, of which others are passed over from twice as many on
 BLOCKS = 8  # of LANES fits, whose neighbourhoods are gathered at once
 # Below this part of a term's square nothing is left but rounding.
 PIVOT = 1e-9
@@ -449,7 +450,9 @@ def neighbourhood(faces, indptr, corners, c, rings, stamp, around):
         new = end
         for q in range(begin, end):
             v = around[q]
-            for k in range(indptr[v], indptr[v + 1]):
+            # Of a vertex of very many faces, a pole, some stand for all: else its neighbours' fits would each
+            # look at all of them.
+            for k in range(indptr[v], indptr[v + 1], max(1, (indptr[v + 1] - indptr[v]) // CROWDED)):
                 f = corners[k] >> 2
                 for s in range(4):
                     x = faces[4 * f + s]
