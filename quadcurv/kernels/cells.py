@@ -33,7 +33,7 @@ from quadcurv.kernels.rows import (
 from quadcurv.kernels.vector import apart, cross, dot, known_square, less, place, plus, times, triple, unit
 
 # In `work`, `NORMAL`, `QUAD_SQUARE`, `LENGTH` are of the quads beside the points of row p. Those below them:
-BELOW, BELOW_SQUARE, BELOW_LENGTH = 18 * S, 21 * S, 22 * S
+BELOW, BELOW_LENGTH, BELOW_SQUARE = 18 * S, 21 * S, 22 * S
 ROOMS = (4 * ROW, ROW + Y, 23 * S)
 
 

@@ -21,6 +21,7 @@ from quadcurv.kernels.vector import (
     dot,
     fused_cross,
     known_square,
+    less,
     place,
     plus,
     times,
@@ -61,13 +62,17 @@ def ask_ring(points, ring, v):
 
 
 @formula
-def corner_normals(x, work, corner, a, b):
-    """Normals (d - c) x (b - a) of one corner of every vertex c of a block."""
+def corner_normals(x, work):
+    """Normals (d - c) x (b - a) of the corners of every vertex c of a block."""
     for k in span(0, BLOCK):
-        u, v = apart(x, a + POINT + k, x, k, BLOCK), apart(x, b + k, x, a + k, BLOCK)
-        n = cross(u, v)
-        place(work, corner * BLOCK + k, CORNERS, n)
-        work[SQUARE + corner * BLOCK + k] = known_square(n, u, v, triple(x, k, BLOCK))
+        c = triple(x, k, BLOCK)
+        around = [triple(x, edge(corner) + k, BLOCK) for corner in range(4)]
+        for corner in range(4):
+            u = less(triple(x, edge(corner) + POINT + k, BLOCK), c)
+            v = less(around[corner - 3], around[corner])
+            n, i = cross(u, v), corner * BLOCK + k
+            place(work, i, CORNERS, n)
+            work[SQUARE + i] = known_square(n, u, v, c)
 
 
 @formula
@@ -151,9 +156,7 @@ def _pass(points, ring, far, liu, Hn, H, normal, area, start, stop, x, work):
             if far and at + k + AHEAD < stop:
                 ask_ring(points, ring, at + k + AHEAD)
             gather_ring(points, ring, at + k, x, k)
-        for corner in range(4):
-            a, b = (2 * corner + 1) * POINT, ((2 * corner + 2) % 8 + 1) * POINT
-            corner_normals(x, work, corner, a, b)
+        corner_normals(x, work)
         corner_units(work)
         if not liu or numbers or normals:
             ring_normals(x, work)

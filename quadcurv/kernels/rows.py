@@ -25,8 +25,8 @@ S = STRETCH + 8  # between planes of a stretch
 FIRST = 8  # place of the first vertex in a plane, its left neighbour before it
 # In `work`: normals of quads, their squares, lengths, diagonals; normals of rings, their squares and scales;
 # what sums of fluxes are multiplied by; what dual areas come from.
-NORMAL, QUAD_SQUARE, LENGTH, U, V, RING, SQUARE, RING_SCALE, SCALE, AREA = (
-    k * S for k in (0, 3, 4, 5, 8, 11, 14, 15, 16, 17)
+NORMAL, LENGTH, U, V, RING, SQUARE, RING_SCALE, SCALE, AREA, QUAD_SQUARE = (
+    k * S for k in (0, 3, 4, 7, 10, 13, 14, 15, 16, 17)
 )
 ROOMS = (4 * ROW, ROW + Y, 18 * S, 3 * S)  # planes, part, work, and where vectors go that nobody wants
 
