@@ -97,7 +97,7 @@ def last_quad(work):
 
 def normals(planes, o, p, q, work, g, ring):
     """Diagonals and normals of quads; with `ring` squares of the rings' normals, with 2 these too."""
-    for k in span(0, STRETCH):
+    for k in span(0, STRETCH, 2):
         i, j = FIRST + g + k, FIRST + k
         u, v = diagonals(planes, p, q, i)
         place(work, j + U, S, u)
@@ -170,7 +170,7 @@ def sums(planes, p, q, work, part, g, width):
     u, v = diagonals(planes, p, q, FIRST + g - 1)
     first, second = fluxes(u, v, triple(work, FIRST - 1 + NORMAL, S))
     before = Carried((*first, *second))
-    for k in span(0, width, 4):
+    for k in span(0, width):
         i, j = FIRST + g + k, FIRST + k
         u, v = triple(work, j + U, S), triple(work, j + V, S)
         first, second = fluxes(u, v, triple(work, j + NORMAL, S))
