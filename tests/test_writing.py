@@ -79,16 +79,19 @@ while True:
         assert len(read(path).points) in (30, 10_000)
 
 
+def interrupted(path):
+    with replacing(path) as beside:
+        assert beside.parent == path.parent
+        assert beside.suffix == path.suffix
+        beside.write_text("new")
+        raise KeyboardInterrupt
+
+
 def test_an_error_leaves_the_old_file_and_nothing_beside(tmp_path):
     path = tmp_path / "a.txt"
     path.write_text("old")
-    writing = replacing(path)
-    beside = writing.__enter__()
-    assert beside.parent == tmp_path
-    assert beside.suffix == ".txt"
-    beside.write_text("new")
     with pytest.raises(KeyboardInterrupt):
-        writing.__exit__(KeyboardInterrupt, KeyboardInterrupt(), None)
+        interrupted(path)
     assert path.read_text() == "old"
     assert os.listdir(tmp_path) == ["a.txt"]
     with replacing(path) as beside:
