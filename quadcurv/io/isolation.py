@@ -23,6 +23,7 @@ from quadcurv.types import MeshError
 
 MEMORY = 200 << 20  # bytes beyond 20 times those of the file
 SECONDS = 8  # of the processor, and one more for every 5 MB
+WALL = 30.0  # seconds on the wall beyond five times those of the processor
 
 
 def isolated(job: str, path: Path) -> tuple[dict[str, Any], dict[str, NDArray[Any]]]:
@@ -47,7 +48,7 @@ def isolated(job: str, path: Path) -> tuple[dict[str, Any], dict[str, NDArray[An
         stderr=subprocess.DEVNULL,
     )
     # On the wall much longer, so that a busy machine ends nothing that gets on.
-    late = threading.Timer(30 + 5 * seconds, process.kill)
+    late = threading.Timer(WALL + 5 * seconds, process.kill)
     late.start()
     try:
         answer, arrays = _received(process, memory)
@@ -90,7 +91,7 @@ def _received(
     arrays: dict[str, NDArray[Any]] = {}
     try:
         answer = json.loads(process.stdout.readline(1 << 24))
-        for name, kind, shape in answer["arrays"]:
+        for name, kind, shape in answer.get("arrays", ()):
             dtype = np.dtype(kind)
             if dtype.kind not in "biuf" or math.prod(shape) * dtype.itemsize > most:
                 return None, {}
@@ -98,7 +99,7 @@ def _received(
             if process.stdout.readinto(data) != len(data):  # type: ignore[attr-defined]
                 return None, {}
             arrays[name] = np.frombuffer(data, dtype).reshape(shape)
-    except (ValueError, KeyError, TypeError, MemoryError):
+    except (ValueError, AttributeError, TypeError, MemoryError):
         return None, {}
     return answer, arrays
 

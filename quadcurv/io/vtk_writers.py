@@ -59,9 +59,13 @@ class Appended:
 
 
 def _attribute(name: str) -> str:
+    return quoteattr(_checked(name))
+
+
+def _checked(name: str) -> str:
     if any(ord(letter) < 32 for letter in name):
-        raise MeshError(f"point_data: {name!r} is no name in XML, which has no control characters")
-    return quoteattr(name)
+        raise MeshError(f"point_data: {name!r} is no name in a file of VTK, which has no control characters")
+    return name
 
 
 def _plain(array: NDArray[Any]) -> NDArray[Any]:
@@ -189,7 +193,7 @@ def _big_endian(array: NDArray[Any]) -> bytes:
 
 def _percent(name: str) -> str:
     """A name as VTK spells it in its legacy files, where a space ends a word."""
-    return quote(name, safe="!#$&'()*+,-./:;<=>?@[\\]^_`{|}~")
+    return quote(_checked(name), safe="!#$&'()*+,-./:;<=>?@[\\]^_`{|}~")
 
 
 def write_vtkhdf(path: Path, mesh: QuadMesh, values: Values) -> None:
