@@ -1,4 +1,4 @@
-"""The documentation: every public object is in it, every example in it runs, and it builds without a warning."""
+"""The documentation: every public object is in it, its examples run, it builds without a warning."""
 
 from __future__ import annotations
 
@@ -32,7 +32,9 @@ BESIDE = (
     estimate.disagreement,
     pyvista_plugin.Accessor,
 )
-OBJECTS = {f"{o.__module__}.{o.__qualname__}": o for o in (*PUBLIC.values(), *BESIDE) if hasattr(o, "__qualname__")}
+OBJECTS = {
+    f"{o.__module__}.{o.__qualname__}": o for o in (*PUBLIC.values(), *BESIDE) if hasattr(o, "__qualname__")
+}
 
 
 @pytest.mark.parametrize("name", sorted(OBJECTS))
@@ -62,7 +64,9 @@ def test_reference_lists_every_public_object():
     entries = set()
     for block in re.split(r"\.\. currentmodule:: ", text)[1:]:
         module = block.split()[0]
-        entries |= {f"{module}.{line.strip()}" for line in block.splitlines() if re.fullmatch(r"   [\w.]+", line)}
+        entries |= {
+            f"{module}.{line.strip()}" for line in block.splitlines() if re.fullmatch(r"   [\w.]+", line)
+        }
     short = {entry.rpartition(".")[2] for entry in entries}
     missing = {name for name in PUBLIC if name.rpartition(".")[2] not in short}
     assert missing <= {"quadcurv.schemes.Scheme"}
@@ -87,5 +91,7 @@ def test_builds_without_a_warning(tmp_path):
     page = (tmp_path / "html" / "auto_examples" / "cubed_sphere.html").read_text()
     assert "<iframe srcdoc=" in page
     for built in (tmp_path / "html").rglob("*.html"):
-        loaded = re.findall(r"<(?:script|link|img|iframe)[^>]*(?:src|href)=.(https?://[^\"']+)", built.read_text())
+        loaded = re.findall(
+            r"<(?:script|link|img|iframe)[^>]*(?:src|href)=.(https?://[^\"']+)", built.read_text()
+        )
         assert not loaded, f"{built.name} loads {loaded}"
