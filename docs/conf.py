@@ -20,7 +20,7 @@ from sphinx_gallery.sorting import ExplicitOrder  # noqa: E402
 
 project = "quadcurv"
 author = "The quadcurv developers"
-copyright = "2026, the quadcurv developers"  # noqa: A001
+copyright = "2026, the quadcurv developers"
 version = release = quadcurv.__version__
 
 extensions = [

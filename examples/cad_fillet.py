@@ -2,8 +2,8 @@
 A fillet
 ========
 
-Where a CAD program rounds an edge, a flat side, a quarter of a cylinder and another flat side meet with one tangent
-but different curvatures: 0, 1 / (2 r) and 0.
+Where a CAD program rounds an edge, a flat side, a quarter of a cylinder and another flat side meet with one
+tangent but different curvatures: 0, 1 / (2 r) and 0.
 """
 
 import numpy as np
@@ -22,8 +22,8 @@ x, z = (np.repeat(profile[:, [k]], along.size, axis=1) for k in (0, 1))
 part = qc.QuadGrid(np.stack([x, np.broadcast_to(along, x.shape), z], axis=-1))
 
 # %%
-# Finite volumes look at one ring of quads, and so see the jump between two vertices; jets look further, and ring on
-# both sides of it.
+# Finite volumes look at one ring of quads, and so see the jump between two vertices; jets look further, and
+# ring on both sides of it.
 found = qc.compare(part, ["finite_volume", "jet-2", "jet"])
 maps(found, "mean_curvature", Style(camera=(-1, -1, 0.9)))
 

@@ -2,8 +2,8 @@
 The error of every operator, on one page
 ========================================
 
-A sphere in six panels has kinks in its grid lines along twelve seams, and eight corners where three quads meet.
-Both are where operators differ.
+A sphere in six panels has kinks in its grid lines along twelve seams, and eight corners where three quads
+meet. Both are where operators differ.
 """
 
 import quadcurv as qc
@@ -14,8 +14,8 @@ mesh, xi, eta = sphere.sample((16, 16), "faces")
 mesh
 
 # %%
-# :func:`quadcurv.compare` runs several operators on one mesh. Here the exact answer is known; where it is not they
-# are held against their median.
+# :func:`quadcurv.compare` runs several operators on one mesh. Here the exact answer is known; where it is
+# not they are held against their median.
 found = qc.compare(mesh, ["finite_volume", "liu", "cotan-6", "jet"], sphere.mean_curvature(xi, eta))
 found
 
@@ -24,8 +24,8 @@ found
 maps(found, "error")
 
 # %%
-# The same as one file of HTML that needs no network. Drag to turn, roll to zoom, click on a vertex for its values,
-# and choose another field.
+# The same as one file of HTML that needs no network. Drag to turn, roll to zoom, click on a vertex for its
+# values, and choose another field.
 html_page(found, "error")
 
 

@@ -2,8 +2,8 @@
 Operators on functions
 ======================
 
-Curvature is the Laplace-Beltrami operator of the positions. The same operator takes any function; on the unit sphere
-a spherical harmonic of degree l is multiplied by -l (l + 1).
+Curvature is the Laplace-Beltrami operator of the positions. The same operator takes any function; on the
+unit sphere a spherical harmonic of degree l is multiplied by -l (l + 1).
 """
 
 import numpy as np
@@ -16,7 +16,7 @@ sphere = qc.surfaces.cubed_sphere()
 
 def harmonic(points: np.ndarray) -> np.ndarray:
     """A spherical harmonic of degree 3."""
-    x, y, z = points.T
+    x, _, z = points.T
     return x * (5 * z**2 - 1)
 
 

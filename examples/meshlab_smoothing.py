@@ -2,8 +2,8 @@
 MeshLab: smoothing noise away
 =============================
 
-Quads go through MeshLab's filters and back: its faux edges keep the pairs of triangles together. This wants the extra
-``meshlab``, which is GPL-3.
+Quads go through MeshLab's filters and back: its faux edges keep the pairs of triangles together. This wants
+the extra ``meshlab``, which is GPL-3.
 """
 
 import numpy as np

@@ -37,14 +37,20 @@ print(np.round(largest, 2))
 
 # %%
 # Mean curvature from -2, blue, to 2, red, at the beginning, half way and in the end.
-STYLE = {"cmap": "RdBu_r", "show_edges": True, "edge_opacity": 0.25, "lighting": False, "show_scalar_bar": False}
+STYLE = {
+    "cmap": "RdBu_r",
+    "show_edges": True,
+    "edge_opacity": 0.25,
+    "lighting": False,
+    "show_scalar_bar": False,
+}
 plotter = pv.Plotter(shape=(1, 3), off_screen=True, window_size=(1600, 460), border=False)
 for k, (moved, H) in enumerate(shown):
     plotter.subplot(0, k)
     plotter.add_mesh(qc.to_pyvista(moved), scalars=H, clim=(-2, 2), **STYLE)
 plotter.link_views()
 plotter.view_vector((0.3, -1, 0.9))
-plotter.camera.zoom(1.5)
+plotter.camera.zoom(1.2)
 
 
 # %%

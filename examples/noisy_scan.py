@@ -2,9 +2,9 @@
 A noisy scan, with error bars
 =============================
 
-Noise of size s in the positions makes an error of about s / h² in a curvature, which is soon larger than the
-curvature. "jet-auto" looks at the residuals of its fits, takes as many rings of faces as pay, and says how far to
-trust the result.
+Noise of size s in the positions makes an error of about s / h² in a curvature, which is soon larger than
+the curvature. "jet-auto" looks at the residuals of its fits, takes as many rings of faces as pay, and says
+how far to trust the result.
 """
 
 import numpy as np
@@ -17,7 +17,9 @@ mesh, xi, eta = torus.sample((96, 48), "faces")
 exact = torus.mean_curvature(xi, eta)
 noise = 0.002  # of a tube of radius 0.8
 rng = np.random.default_rng(1)
-scan = mesh.with_points(mesh.points + noise * rng.normal(size=(len(mesh.points), 1)) * qc.vertex_normals(mesh))
+scan = mesh.with_points(
+    mesh.points + noise * rng.normal(size=(len(mesh.points), 1)) * qc.vertex_normals(mesh)
+)
 
 # %%
 # Operators of one ring pass the noise on, amplified; "jet-auto" averages it out.
@@ -25,19 +27,21 @@ found = qc.compare(scan, ["finite_volume", "jet", "jet-auto"], exact)
 maps(found, "mean_curvature")
 
 # %%
-# The errors in numbers. Everything that is known comes from :func:`quadcurv.curvatures`: the noise itself, how many
-# rings were taken, and one standard deviation of H.
+# The errors in numbers. Everything that is known comes from :func:`quadcurv.curvatures`: the noise itself,
+# how many rings were taken, and one standard deviation of H.
 found
 
 # %%
 all_of_it = qc.curvatures(scan, "jet-auto")
-print("noise %.4f, as put in %.4f" % (np.median(all_of_it.noise), noise))
-print("rings", np.unique(all_of_it.rings), "standard error of H %.3f" % np.median(all_of_it.standard_error.mean))
+print(f"noise {np.median(all_of_it.noise):.4f}, as put in {noise:.4f}")
+print(
+    "rings", np.unique(all_of_it.rings), f"standard error of H {np.median(all_of_it.standard_error.mean):.3f}"
+)
 
 
 # %%
-# The bars stand for noise alone. What smoothing costs they leave out, and so fewer of the errors lie within one
-# standard deviation than the two thirds that noise alone would give.
+# The bars stand for noise alone. What smoothing costs they leave out, and so fewer of the errors lie within
+# one standard deviation than the two thirds that noise alone would give.
 def main() -> float:
     """Return the part of the vertices whose error is within one standard error."""
     return float((np.abs(all_of_it.mean - exact) < all_of_it.standard_error.mean).mean())

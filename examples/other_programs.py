@@ -2,8 +2,8 @@
 Meshes of other programs
 ========================
 
-The two arrays of points and faces suffice, whoever has them: Gmsh, compas, Blender, a solver. Files go through
-:func:`quadcurv.read` and :func:`quadcurv.write`.
+The two arrays of points and faces suffice, whoever has them: Gmsh, compas, Blender, a solver. Files go
+through :func:`quadcurv.read` and :func:`quadcurv.write`.
 """
 
 from pathlib import Path
@@ -21,8 +21,8 @@ pyramid = qc.as_mesh((points, [[0, 3, 2, 1], [0, 1, 4], [1, 2, 4], [2, 3, 4], [3
 print(pyramid)
 
 # %%
-# A solver's structured grid is a QuadGrid; its results travel in files that ParaView (.vtp) and Blender (.ply) read,
-# quads and values kept.
+# A solver's structured grid is a QuadGrid; its results travel in files that ParaView (.vtp) and Blender
+# (.ply) read, quads and values kept.
 hyperboloid = qc.surfaces.hyperboloid()
 grid, xi, eta = hyperboloid.sample((48, 24))
 H = qc.mean_curvature(grid)

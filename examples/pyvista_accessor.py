@@ -2,7 +2,8 @@
 pyvista: curvature as a method
 ==============================
 
-Installing quadcurv is enough: pyvista's meshes then have ``mesh.quadcurv``, and nothing of quadcurv is imported here.
+Installing quadcurv is enough: pyvista's meshes then have ``mesh.quadcurv``, and nothing of quadcurv is
+imported here.
 """
 
 import numpy as np
@@ -30,7 +31,14 @@ for n in (32, 63):
 # Values are in the order of the points, ready for everything that pyvista does with them.
 grid["K"] = grid.quadcurv.gaussian_curvature(wrap=(False, True))
 plotter = pv.Plotter(off_screen=True, window_size=(1000, 800))
-bar = {"title": "K", "vertical": True, "n_labels": 3, "label_font_size": 26, "title_font_size": 28, "position_x": 0.86}
+bar = {
+    "title": "K",
+    "vertical": True,
+    "n_labels": 3,
+    "label_font_size": 26,
+    "title_font_size": 28,
+    "position_x": 0.86,
+}
 plotter.add_mesh(grid, scalars="K", cmap="viridis", edge_opacity=0.2, show_edges=True, scalar_bar_args=bar)
 
 

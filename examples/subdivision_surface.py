@@ -2,8 +2,8 @@
 A subdivision surface
 =====================
 
-Catmull and Clark's scheme makes a smooth surface of a coarse control mesh. Its curvature is continuous but at the
-extraordinary vertices, where other than four quads meet, and there operators are put to the test.
+Catmull and Clark's scheme makes a smooth surface of a coarse control mesh. Its curvature is continuous but
+at the extraordinary vertices, where other than four quads meet, and there operators are put to the test.
 """
 
 from collections import Counter

@@ -18,11 +18,11 @@ z[(x - 1500) ** 2 + (y - 1500) ** 2 < 200**2] = NODATA  # a lake
 z[40:46, 10:13] = NODATA  # and a cloud
 
 # %%
-# The mask makes holes of these cells. Results are NaN in them; beside them, as at the outer border, rows are
-# continued by extrapolation wherever enough points lead inward.
+# The mask makes holes of these cells. Results are NaN in them; beside them, as at the outer border, rows
+# are continued by extrapolation wherever enough points lead inward.
 terrain = qc.QuadGrid(np.stack([x, y, z], axis=-1), mask=z == NODATA)
 H = qc.mean_curvature(terrain)
-print(terrain, "H from %.2e to %.2e per metre" % (np.nanmin(H), np.nanmax(H)))
+print(terrain, f"H from {np.nanmin(H):.2e} to {np.nanmax(H):.2e} per metre")
 
 # %%
 # With ``indexing="ij"`` the normal points up: summits and ridges have H > 0, valleys H < 0.

@@ -2,8 +2,8 @@
 From triangles to quads to a grid
 =================================
 
-What was lost on the way through a triangle format is found again: pairs of triangles by their shape, and the grid by its
-connectivity.
+What was lost on the way through a triangle format is found again: pairs of triangles by their shape, and
+the grid by its connectivity.
 """
 
 import numpy as np

@@ -2,7 +2,8 @@
 trimesh: quads found again
 ==========================
 
-A trimesh.Trimesh knows triangles only, and cuts quads on load. The order of the halves tells which belong together.
+A trimesh.Trimesh knows triangles only, and cuts quads on load. The order of the halves tells which belong
+together.
 """
 
 from pathlib import Path

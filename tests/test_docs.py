@@ -1,4 +1,4 @@
-"""The documentation: every public object is in it, every example in it runs, and it builds without a warning."""
+"""The documentation: every public object is in it, its examples run, it builds without a warning."""
 
 from __future__ import annotations
 

@@ -26,6 +26,7 @@ from quadcurv.cli.say import say
 from quadcurv.cli.values import VALUES, Value, values
 from quadcurv.comparison import Comparison
 from quadcurv.comparison import compare as compared
+from quadcurv.extras import missing, need
 from quadcurv.io import write
 from quadcurv.io.base import FORMATS
 from quadcurv.mesh import Mesh
@@ -75,8 +76,14 @@ def compare(
     check_schemes(scheme)
     style = picture.style()
     check_file(csv_file, "--csv")
+    problem = missing("matplotlib")
     if output is None and not as_json:
-        output = Path("quadcurv-output")
+        if problem:
+            say(f"no pictures: {problem}")
+        else:
+            output = Path("quadcurv-output")
+    elif output is not None and problem:
+        raise ImportError(problem)
     check_folder(output, "--output")
     found = load(mesh, options)
     comparison = compared(found.mesh, scheme, boundary=options.boundary)
@@ -198,6 +205,7 @@ def view(
 
 
 def _check_rendering(html: Path | None, png: Path | None) -> None:
+    need("matplotlib")
     problem = None
     if png is not None:
         problem = viewing.opengl_problem()

@@ -14,6 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from quadcurv.extras import need
 from quadcurv.mesh import QuadMesh
 from quadcurv.types import Bools, Indices, Ints, MeshError, MeshWarning
 
@@ -245,6 +246,7 @@ def checked_values(name: str, values: NDArray[Any], shape: tuple[int, ...]) -> N
 
 def colours(values: NDArray[Any], colormap: str = "viridis") -> NDArray[np.uint8]:
     """RGBA of scalars over the range from their 2nd to their 98th percentile; grey where not finite."""
+    need("matplotlib")
     from matplotlib import colormaps
 
     if colormap not in colormaps:

@@ -151,10 +151,8 @@ def read_trimesh(path: str, memory: int, seconds: int) -> Answer:
 
 def read_meshlane(path: str, memory: int, seconds: int) -> Answer:
     """Points, blocks of cells and point data."""
-    try:
-        import meshlane
-    except ImportError:
-        return {"missing": "meshlane"}, {}
+    import meshlane
+
     abaqus = getattr(meshlane.abaqus._abaqus, "abaqus_to_meshio_type", {})
     for family in ("S", "M3D", "CPS", "CPE", "CAX", "DS", "R3D", "SFM3D"):
         for nodes, name in ((3, "triangle"), (4, "quad"), (6, "triangle6"), (8, "quad8"), (9, "quad9")):

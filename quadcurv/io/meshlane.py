@@ -10,19 +10,18 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from quadcurv.extras import need
 from quadcurv.io.base import Content, Format, Library, polygons, register
 from quadcurv.io.cells import faces_of_cells, type_of_name
 from quadcurv.io.isolation import isolated
-from quadcurv.types import MeshError
 
 Block = tuple[str, NDArray[Any], NDArray[Any]]  # type of its cells, their sizes, their nodes
 
 
 def read_meshlane(path: Path) -> Content:
     """Faces and point data."""
+    need("meshlane")
     answer, arrays = isolated("read_meshlane", path)
-    if "missing" in answer:
-        raise MeshError(f'{path.suffix} needs meshlane: pip install "quadcurv[formats]"')
     blocks = [(name, arrays[f"{k} sizes"], arrays[f"{k} corners"]) for k, name in enumerate(answer["names"])]
     values = {name.removeprefix("value "): v for name, v in arrays.items() if name.startswith("value ")}
     content = _content(arrays["points"], blocks, values)

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from quadcurv.extras import need
 from quadcurv.io import ply
 from quadcurv.io.base import Content, Library, checked_values, is_a, polygons, register
 from quadcurv.mesh import QuadMesh
@@ -48,10 +49,9 @@ def _current_mesh(mesh: Any) -> Any:
 
 def from_mesh(mesh: QuadMesh) -> Any:
     """A MeshSet of one mesh, quads and doubles kept."""
+    need("pymeshlab")
     try:
         import pymeshlab
-    except ModuleNotFoundError:
-        raise ImportError('pymeshlab is not installed: pip install "quadcurv[meshlab]"') from None
     except ImportError as error:
         raise ImportError(f"pymeshlab lacks a system library (on Debian, libgl1): {error}") from None
     meshes = pymeshlab.MeshSet()

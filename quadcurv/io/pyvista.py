@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from quadcurv.extras import need
 from quadcurv.io.base import Content, FaceList, Library, checked_values, is_a, register
 from quadcurv.io.vtk import dataset
 from quadcurv.mesh import QuadMesh
@@ -42,6 +43,7 @@ def _add_cells(arrays: dict[str, NDArray[Any]], cells: Any) -> None:
 def wrapped(dataset: Any) -> Any:
     """A dataset of VTK as one of pyvista."""
     if not any(base.__module__.startswith("pyvista") for base in type(dataset).__mro__):
+        need("pyvista")
         import pyvista
 
         dataset = pyvista.wrap(dataset)
@@ -55,6 +57,7 @@ def wrapped(dataset: Any) -> Any:
 
 def from_mesh(mesh: QuadMesh) -> Any:
     """A PolyData of the same faces."""
+    need("pyvista")
     import pyvista
 
     faces = FaceList.of(mesh)
@@ -65,6 +68,7 @@ def from_mesh(mesh: QuadMesh) -> Any:
 
 def from_grid(points: Floats, wrap: tuple[bool, bool]) -> Any:
     """A StructuredGrid whose last row or column repeats the first one where the grid wraps."""
+    need("pyvista")
     import pyvista
 
     points = np.pad(points, [*((0, int(w)) for w in wrap), (0, 0)], mode="wrap")

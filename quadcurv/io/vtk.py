@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from quadcurv.extras import need
 from quadcurv.io.base import Content, polygons
 from quadcurv.io.cells import faces_of_cells
 from quadcurv.io.isolation import isolated
@@ -20,6 +21,7 @@ HIDDEN_POINT = 2  # the bit of vtkGhostType that hides a point
 
 def read_vtk(path: Path) -> Content:
     """Polygons, or the one layer of a grid, and all point data."""
+    need("vtkmodules")
     if path.suffix.lower() == ".vts":
         _refuse_missing_pieces(path)
     return dataset(*isolated("read_vtk", path))

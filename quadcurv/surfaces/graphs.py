@@ -27,7 +27,8 @@ def plane() -> Surface:
     --------
     >>> import quadcurv as qc
     >>> surface = qc.surfaces.plane()
-    >>> round(float(surface.mean_curvature(0.3, 0.2)), 6), round(float(surface.gaussian_curvature(0.3, 0.2)), 6)
+    >>> H, K = surface.mean_curvature(0.3, 0.2), surface.gaussian_curvature(0.3, 0.2)
+    >>> round(float(H), 6), round(float(K), 6)
     (0.0, 0.0)
     """
     return closed_form(
@@ -94,7 +95,8 @@ def elliptic_paraboloid(a: float = 1.0, b: float = 1.0) -> Surface:
     --------
     >>> import quadcurv as qc
     >>> surface = qc.surfaces.elliptic_paraboloid()
-    >>> round(float(surface.mean_curvature(0.5, 0.25)), 6), round(float(surface.gaussian_curvature(0.5, 0.25)), 6)
+    >>> H, K = surface.mean_curvature(0.5, 0.25), surface.gaussian_curvature(0.5, 0.25)
+    >>> round(float(H), 6), round(float(K), 6)
     (-0.962963, 0.790123)
     """
     require_positive(a=a, b=b)
@@ -135,7 +137,8 @@ def hyperbolic_paraboloid(a: float = 1.0, b: float = 1.0) -> Surface:
     --------
     >>> import quadcurv as qc
     >>> surface = qc.surfaces.hyperbolic_paraboloid()
-    >>> round(float(surface.mean_curvature(0.5, 0.25)), 6), round(float(surface.gaussian_curvature(0.5, 0.25)), 6)
+    >>> H, K = surface.mean_curvature(0.5, 0.25), surface.gaussian_curvature(0.5, 0.25)
+    >>> round(float(H), 6), round(float(K), 6)
     (0.222222, -0.790123)
     """
     require_positive(a=a, b=b)
@@ -177,7 +180,8 @@ def tanh_sheet(height: float = 1.0) -> Surface:
     --------
     >>> import quadcurv as qc
     >>> surface = qc.surfaces.tanh_sheet()
-    >>> round(float(surface.mean_curvature(0.5, 0.25)), 6), round(float(surface.gaussian_curvature(0.5, 0.25)), 6)
+    >>> H, K = surface.mean_curvature(0.5, 0.25), surface.gaussian_curvature(0.5, 0.25)
+    >>> round(float(H), 6), round(float(K), 6)
     (0.204842, -0.338511)
     """
     require_positive(height=height)

@@ -35,7 +35,8 @@ def catenoid(waist: float = 1.0) -> Surface:
     --------
     >>> import quadcurv as qc
     >>> surface = qc.surfaces.catenoid()
-    >>> round(float(surface.mean_curvature(0.0, 0.2)), 6), round(float(surface.gaussian_curvature(0.0, 0.2)), 6)
+    >>> H, K = surface.mean_curvature(0.0, 0.2), surface.gaussian_curvature(0.0, 0.2)
+    >>> round(float(H), 6), round(float(K), 6)
     (0.0, -1.0)
     """
     require_positive(waist=waist)
@@ -81,7 +82,8 @@ def helicoid(pitch: float = 2 * np.pi) -> Surface:
     --------
     >>> import quadcurv as qc
     >>> surface = qc.surfaces.helicoid()
-    >>> round(float(surface.mean_curvature(0.5, 0.25)), 6), round(float(surface.gaussian_curvature(0.5, 0.25)), 6)
+    >>> H, K = surface.mean_curvature(0.5, 0.25), surface.gaussian_curvature(0.5, 0.25)
+    >>> round(float(H), 6), round(float(K), 6)
     (0.0, -0.64)
     """
     require_positive(pitch=pitch)
@@ -116,7 +118,8 @@ def enneper() -> Surface:
     --------
     >>> import quadcurv as qc
     >>> surface = qc.surfaces.enneper()
-    >>> round(float(surface.mean_curvature(0.5, 0.25)), 6), round(float(surface.gaussian_curvature(0.5, 0.25)), 6)
+    >>> H, K = surface.mean_curvature(0.5, 0.25), surface.gaussian_curvature(0.5, 0.25)
+    >>> round(float(H), 6), round(float(K), 6)
     (0.0, -1.347916)
     """
     return closed_form(
@@ -155,7 +158,8 @@ def henneberg() -> Surface:
     --------
     >>> import quadcurv as qc
     >>> surface = qc.surfaces.henneberg()
-    >>> round(float(surface.mean_curvature(0.5, 0.25)), 6), round(float(surface.gaussian_curvature(0.5, 0.25)), 6)
+    >>> H, K = surface.mean_curvature(0.5, 0.25), surface.gaussian_curvature(0.5, 0.25)
+    >>> round(float(H), 6), round(float(K), 6)
     (0.0, -0.023996)
     """
 

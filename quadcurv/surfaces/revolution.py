@@ -41,7 +41,8 @@ def cylinder(radius: float = 1.0, f: Callable[[Floats], Floats] | None = None) -
     --------
     >>> import quadcurv as qc
     >>> surface = qc.surfaces.cylinder()
-    >>> round(float(surface.mean_curvature(0.3, 0.2)), 6), round(float(surface.gaussian_curvature(0.3, 0.2)), 6)
+    >>> H, K = surface.mean_curvature(0.3, 0.2), surface.gaussian_curvature(0.3, 0.2)
+    >>> round(float(H), 6), round(float(K), 6)
     (0.5, 0.0)
     """
     require_positive(radius=radius)
@@ -87,7 +88,8 @@ def torus(major: float = 2.0, minor: float = 1.0) -> Surface:
     --------
     >>> import quadcurv as qc
     >>> surface = qc.surfaces.torus()
-    >>> round(float(surface.mean_curvature(0.5, 0.25)), 6), round(float(surface.gaussian_curvature(0.5, 0.25)), 6)
+    >>> H, K = surface.mean_curvature(0.5, 0.25), surface.gaussian_curvature(0.5, 0.25)
+    >>> round(float(H), 6), round(float(K), 6)
     (0.663176, 0.326353)
     """
     require_positive(major=major, minor=minor)
@@ -141,7 +143,8 @@ def hyperboloid(radius: float = 1.0, height: float = 1.0) -> Surface:
     --------
     >>> import quadcurv as qc
     >>> surface = qc.surfaces.hyperboloid()
-    >>> round(float(surface.mean_curvature(0.5, 0.25)), 6), round(float(surface.gaussian_curvature(0.5, 0.25)), 6)
+    >>> H, K = surface.mean_curvature(0.5, 0.25), surface.gaussian_curvature(0.5, 0.25)
+    >>> round(float(H), 6), round(float(K), 6)
     (0.053292, -0.786448)
     """
     require_positive(radius=radius, height=height)
@@ -205,7 +208,8 @@ def dupin_cyclide(major: float = 2.0, minor: float = 1.0, offset: float = 0.5) -
     --------
     >>> import quadcurv as qc
     >>> surface = qc.surfaces.dupin_cyclide()
-    >>> round(float(surface.mean_curvature(0.5, 0.25)), 6), round(float(surface.gaussian_curvature(0.5, 0.25)), 6)
+    >>> H, K = surface.mean_curvature(0.5, 0.25), surface.gaussian_curvature(0.5, 0.25)
+    >>> round(float(H), 6), round(float(K), 6)
     (0.421084, -1.674421)
     """
     require_positive(major=major, minor=minor, offset=offset)

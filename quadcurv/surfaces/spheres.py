@@ -71,7 +71,8 @@ def sphere(radius: float = 1.0, latitude: float = np.pi / 3) -> Surface:
     --------
     >>> import quadcurv as qc
     >>> surface = qc.surfaces.sphere(radius=2.0)
-    >>> round(float(surface.mean_curvature(0.3, 0.2)), 6), round(float(surface.gaussian_curvature(0.3, 0.2)), 6)
+    >>> H, K = surface.mean_curvature(0.3, 0.2), surface.gaussian_curvature(0.3, 0.2)
+    >>> round(float(H), 6), round(float(K), 6)
     (0.5, 0.25)
     """
     return _sphere(
@@ -146,7 +147,8 @@ def pillow_sphere(radius: float = 1.0) -> Surface:
     --------
     >>> import quadcurv as qc
     >>> surface = qc.surfaces.pillow_sphere()
-    >>> round(float(surface.mean_curvature(-2.5, 0.2)), 6), round(float(surface.gaussian_curvature(-2.5, 0.2)), 6)
+    >>> H, K = surface.mean_curvature(-2.5, 0.2), surface.gaussian_curvature(-2.5, 0.2)
+    >>> round(float(H), 6), round(float(K), 6)
     (1.0, 1.0)
     """
     return _sphere(
@@ -217,7 +219,8 @@ def cubed_sphere(radius: float = 1.0) -> Surface:
     --------
     >>> import quadcurv as qc
     >>> surface = qc.surfaces.cubed_sphere()
-    >>> round(float(surface.mean_curvature(0.3, 0.2)), 6), round(float(surface.gaussian_curvature(0.3, 0.2)), 6)
+    >>> H, K = surface.mean_curvature(0.3, 0.2), surface.gaussian_curvature(0.3, 0.2)
+    >>> round(float(H), 6), round(float(K), 6)
     (1.0, 1.0)
     """
     return _sphere(
@@ -290,7 +293,8 @@ def ellipsoid(a: float = 2.0, b: float = 1.5, c: float = 1.0, latitude: float = 
     --------
     >>> import quadcurv as qc
     >>> surface = qc.surfaces.ellipsoid()
-    >>> round(float(surface.mean_curvature(0.5, 0.25)), 6), round(float(surface.gaussian_curvature(0.5, 0.25)), 6)
+    >>> H, K = surface.mean_curvature(0.5, 0.25), surface.gaussian_curvature(0.5, 0.25)
+    >>> round(float(H), 6), round(float(K), 6)
     (1.078156, 0.973362)
     """
     return _scaled("ellipsoid", sphere(latitude=latitude), _longitude_latitude, a, b, c)
@@ -323,7 +327,8 @@ def cubed_ellipsoid(a: float = 2.0, b: float = 1.5, c: float = 1.0) -> Surface:
     --------
     >>> import quadcurv as qc
     >>> surface = qc.surfaces.cubed_ellipsoid()
-    >>> round(float(surface.mean_curvature(0.5, 0.25)), 6), round(float(surface.gaussian_curvature(0.5, 0.25)), 6)
+    >>> H, K = surface.mean_curvature(0.5, 0.25), surface.gaussian_curvature(0.5, 0.25)
+    >>> round(float(H), 6), round(float(K), 6)
     (0.949557, 0.858125)
     """
     return _scaled("cubed_ellipsoid", cubed_sphere(), _cube, a, b, c)

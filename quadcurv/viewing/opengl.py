@@ -7,6 +7,8 @@ import os
 import subprocess
 import sys
 
+from quadcurv.extras import missing
+
 _PROBE = """
 import sys
 sys.path[:] = sys.argv[1:]
@@ -42,6 +44,9 @@ def opengl_problem() -> str | None:
     >>> if opengl_problem() is None:
     ...     print("pictures can be made")  # doctest: +SKIP
     """
+    problem = missing("pyvista")
+    if problem:
+        return problem
     here = os.path.realpath(os.curdir)
     folders = [folder for folder in sys.path if folder and os.path.realpath(folder) != here]
     command = [sys.executable, "-I", "-c", _PROBE, *folders]

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from quadcurv.comparison import Comparison, compare
+from quadcurv.extras import need
 from quadcurv.io.replacing import replacing
 from quadcurv.viewing.opengl import NoOpenGLError, opengl_problem, window_problem
 from quadcurv.viewing.page import Page, make_page
@@ -122,6 +123,7 @@ def html_page(what: Any, field: str = "mean_curvature", style: Style | None = No
     >>> page.text[:15].lower()
     '<!doctype html>'
     """
+    need("matplotlib")
     return make_page(_comparison(what), field, style)
 
 

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from quadcurv.extras import need
 from quadcurv.viewing.scale import Field
 
 
@@ -63,6 +64,7 @@ class Style:
         if self.title is not None and len(self.title.splitlines()) != 1:
             raise ValueError(f"title: expected one line, got {self.title!r}")
         if self.colours is not None:
+            need("matplotlib")
             import matplotlib as mpl
 
             if self.colours not in mpl.colormaps:

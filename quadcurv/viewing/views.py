@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from quadcurv.comparison import Comparison
+from quadcurv.extras import need
 from quadcurv.types import Ints
 from quadcurv.viewing.fields import Fields
 from quadcurv.viewing.geometry import OVERLAYS
@@ -86,6 +87,7 @@ class View:
         off_screen: bool = False,
         refined: Callable[[int], Comparison] | None = None,
     ) -> None:
+        need("pyvista", "matplotlib")
         self.picked: int | None = None
         self.shown: set[str] = set()
         self.style = style or Style()
