@@ -6,41 +6,32 @@ from quadcurv.kernels.compiled import flat, kernel
 
 
 @kernel
-def _pattern(first, corners, n, p):
-    start = np.zeros(p + 2, np.int64)
+def _faces_by_vertex(first, corners, start, around):
+    # `start` counts up where the next face of a vertex goes, and so ends up one vertex ahead.
     for c in range(corners.size):
         start[corners[c] + 2] += 1
-    for w in range(p):
+    for w in range(start.size - 2):
         start[w + 2] += start[w + 1]
-    around = np.empty(corners.size, np.int32)  # faces, vertex by vertex
     for f in range(first.size - 1):
         for c in range(first[f], first[f + 1]):
             w = corners[c] + 1
             around[start[w]] = f
             start[w] += 1
-    indptr = np.zeros(n + 1, np.int64)
-    indices = np.empty(0, np.int32)
-    for turn in range(2):  # count, then write
-        last = np.full(n, -1, np.int32)
-        for w in range(p):
-            for k in range(start[w], start[w + 1]):
-                for c in range(first[around[k]], first[around[k] + 1]):
-                    v = corners[c]
-                    if v < n and last[v] != w:
-                        last[v] = w
-                        if turn == 1:
-                            indices[indptr[v]] = w
-                            indptr[v] += 1
-                        else:
-                            indptr[v + 1] += 1
-        if turn == 0:
-            for v in range(n):
-                indptr[v + 1] += indptr[v]
-            indices = np.empty(indptr[n], np.int32)
-    for v in range(n, 0, -1):
-        indptr[v] = indptr[v - 1]
-    indptr[0] = 0
-    return indptr, indices
+
+
+@kernel
+def _columns(first, corners, start, around, last, end, indices):
+    # Where `indices` has no room they are only counted.
+    n = last.size
+    for w in range(start.size - 2):
+        for k in range(start[w], start[w + 1]):
+            for c in range(first[around[k]], first[around[k] + 1]):
+                v = corners[c]
+                if v < n and last[v] != w:
+                    last[v] = w
+                    if indices.size > 0:
+                        indices[end[v]] = w
+                    end[v] += 1
 
 
 def pattern(first, corners, n, p):
@@ -49,7 +40,16 @@ def pattern(first, corners, n, p):
     Face f has the vertices ``corners[first[f]:first[f + 1]]``, all less than p. Columns come out sorted: they
     are gone through in their order, each being appended to the rows that it stands in.
     """
-    return _pattern(flat(first), flat(corners), n, p)
+    first, corners = flat(first), flat(corners)
+    start, around = np.zeros(p + 2, np.int64), np.empty(corners.size, np.int32)
+    _faces_by_vertex(first, corners, start, around)
+    indptr, indices = np.zeros(n + 1, np.int64), np.empty(0, np.int32)
+    _columns(first, corners, start, around, np.full(n, -1, np.int32), indptr[1:], indices)
+    np.cumsum(indptr, out=indptr)
+    end, indices = indptr[:-1].copy(), np.empty(indptr[-1], np.int32)
+    if indices.size:
+        _columns(first, corners, start, around, np.full(n, -1, np.int32), end, indices)
+    return indptr, indices
 
 
 @kernel

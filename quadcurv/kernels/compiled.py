@@ -1,6 +1,8 @@
 """How kernels are compiled: strict arithmetic, no lock held, and kept on disk where anything can be written.
 
-Arithmetic is strict (no `fastmath`): NaN is seen, and results do not depend on how loops are cut.
+Arithmetic is strict (no `fastmath`): NaN is seen, and results do not depend on how loops are cut. Kernels
+make no arrays, so that numba's counting of who holds one is left out (`_nrt`): it takes time to compile, to
+load, and, where it waits for all that is being written, to run.
 
 What is compiled is kept under a digest of all files of kernels, so that these may share helpers: numba's own
 cache notices an edit to the file of the function that it keeps, no other. Every compiled function has a file
@@ -25,11 +27,10 @@ import numpy as np
 from numba import njit
 from numba.core.caching import CompileResultCacheImpl, _Cache
 from numba.core.compiler_lock import global_compiler_lock
-from numba.core.runtime import rtsys
 from numba.core.serialize import dumps
 
 _log = logging.getLogger("quadcurv")
-_OPTIONS: dict[str, Any] = {"nogil": True, "error_model": "numpy", "no_cfunc_wrapper": True}
+_OPTIONS: dict[str, Any] = {"nogil": True, "error_model": "numpy", "no_cfunc_wrapper": True, "_nrt": False}
 
 helper = njit(**{**_OPTIONS, "no_cpython_wrapper": True})
 
@@ -98,7 +99,6 @@ class _Files(_Cache):
 
     def load_overload(self, sig, target_context):
         """What is kept for a signature, None if there is nothing sound."""
-        rtsys.initialize(target_context)  # all else that a compiler needs is not needed to load
         if self._numba is not None:
             with contextlib.suppress(Exception):  # whatever is wrong with it, it is compiled again
                 data = self._file(sig, target_context.codegen()).read_bytes()

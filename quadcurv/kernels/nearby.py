@@ -20,7 +20,7 @@ def _rings_around(faces, indptr, corners, vertices, rings, room, stamp, around, 
                 v = around[base + q]
                 step = max(1, (indptr[v + 1] - indptr[v]) // FACES)
                 for at in range(indptr[v], indptr[v + 1], step):
-                    f = corners[at] // 4
+                    f = corners[at] >> 2
                     for s in range(4):
                         x = faces[4 * f + s]
                         if x >= 0 and stamp[x] != k and new < room:

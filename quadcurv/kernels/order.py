@@ -3,7 +3,7 @@
 import numpy as np
 
 from quadcurv.kernels.compiled import flat, helper, kernel
-from quadcurv.kernels.formulas import formula, span
+from quadcurv.kernels.formulas import formula, span, where
 from quadcurv.kernels.vector import place, triple
 
 PATCH = 65536  # vertices: one step of breadth-first order through them stays in the first-level cache
@@ -12,23 +12,16 @@ PATCH = 65536  # vertices: one step of breadth-first order through them stays in
 @helper
 def free_neighbour(ring, v, placed):
     """A neighbour of a regular vertex that has no place yet, -1 if there is none."""
-    if ring[v, 0] >= 0:
-        for k in range(0, 8, 2):
-            if not placed[ring[v, k]]:
-                return ring[v, k]
+    if ring[8 * v] >= 0:
+        for k in range(8 * v, 8 * v + 8, 2):
+            if not placed[ring[k]]:
+                return ring[k]
     return -1
 
 
 @kernel
-def nearby_order(ring):
-    """Vertices patch by patch, each of PATCH neighbours along the edges of regular vertices.
-
-    A patch is a vertex and what comes next in breadth-first order; it begins beside an earlier one.
-    """
-    n = ring.shape[0]
-    order = np.empty(n, np.int32)
-    placed = np.zeros(n, np.bool_)
-    size = beside = 0
+def _nearby_order(ring, order, placed):
+    n, size, beside = order.size, 0, 0
     for root in range(n):
         start = -1 if placed[root] else root
         while start >= 0:
@@ -46,22 +39,39 @@ def nearby_order(ring):
             while beside < size and start < 0:
                 start = free_neighbour(ring, order[beside], placed)
                 beside += start < 0
+
+
+def nearby_order(ring):
+    """Vertices patch by patch, each of PATCH neighbours along the edges of regular vertices.
+
+    A patch is a vertex and what comes next in breadth-first order; it begins beside an earlier one.
+    """
+    order, placed = np.empty(len(ring), np.int32), np.zeros(len(ring), bool)
+    _nearby_order(flat(ring), order, placed)
     return order
 
 
+@formula
+def renumbered_ring(ring, order, place, k, moved):
+    """The ring of the k-th vertex of an order."""
+    v = order[k]
+    regular = ring[8 * v] >= 0
+    for j in range(8):
+        moved[8 * k + j] = where(regular, place[where(regular, ring[8 * v + j], 0)], -1)
+
+
 @kernel
-def renumbered(ring, order):
-    """Rings in another order, their vertices numbered by place in it; and the places."""
-    place = np.empty(order.size, np.int32)
+def _renumbered(ring, order, place, moved):
     for k in range(order.size):
         place[order[k]] = k
-    moved = np.empty_like(ring)
     for k in range(order.size):
-        v = order[k]
-        moved[k, 0] = -1
-        if ring[v, 0] >= 0:
-            for j in range(8):
-                moved[k, j] = place[ring[v, j]]
+        renumbered_ring(ring, order, place, k, moved)
+
+
+def renumbered(ring, order):
+    """Rings in another order, their vertices numbered by place in it; and the places."""
+    place, moved = np.empty(order.size, np.int32), np.empty_like(ring)
+    _renumbered(flat(ring), flat(order), place, moved.reshape(-1))
     return moved, place
 
 
