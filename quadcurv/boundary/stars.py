@@ -214,7 +214,7 @@ def bent(twist: Floats, a: Floats, b: Floats) -> Floats:
     edges = np.linalg.norm(a, axis=-1) + np.linalg.norm(b, axis=-1)
     most = np.minimum(_BENT * edges, 2.5 * _BENT * np.linalg.norm(a + b, axis=-1))
     size = np.linalg.norm(twist, axis=-1)
-    return twist * np.minimum(1, most / np.maximum(size, np.finfo(float).tiny))[..., None]
+    return twist * np.divide(most, size, out=np.ones_like(size), where=size > most)[..., None]
 
 
 def regular_stars(stencils: Stencils, surfaces: Surfaces) -> Stars:
