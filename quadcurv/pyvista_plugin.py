@@ -51,7 +51,7 @@ class Accessor:
 
     def mean_curvature(
         self,
-        scheme: str | Scheme = "finite_volume",
+        scheme: str | Scheme = curvature.DEFAULT,
         boundary: str = "extrapolate",
         wrap: Wrap = None,
     ) -> Floats:
@@ -60,7 +60,7 @@ class Accessor:
 
     def mean_curvature_normal(
         self,
-        scheme: str | Scheme = "finite_volume",
+        scheme: str | Scheme = curvature.DEFAULT,
         boundary: str = "extrapolate",
         wrap: Wrap = None,
     ) -> Floats:
@@ -68,10 +68,17 @@ class Accessor:
         return self._by_point(curvature.mean_curvature_normal(self._mesh(wrap), scheme, boundary))
 
     def gaussian_curvature(
-        self, scheme: str | Fit = "jet", boundary: str = "extrapolate", wrap: Wrap = None
+        self, scheme: str | Fit = curvature.DEFAULT, boundary: str = "extrapolate", wrap: Wrap = None
     ) -> Floats:
         """(n,) Gaussian curvature in 1 / length^2; see :func:`quadcurv.gaussian_curvature`."""
         return self._by_point(curvature.gaussian_curvature(self._mesh(wrap), scheme, boundary))
+
+    def principal_curvatures(
+        self, scheme: str | Fit = curvature.DEFAULT, boundary: str = "extrapolate", wrap: Wrap = None
+    ) -> curvature.PrincipalCurvatures:
+        """k1, k2 (n,) and their directions (n, 3); see :func:`quadcurv.principal_curvatures`."""
+        found = curvature.principal_curvatures(self._mesh(wrap), scheme, boundary)
+        return curvature.PrincipalCurvatures(*map(self._by_point, found))
 
     def vertex_normals(self, boundary: str = "extrapolate", wrap: Wrap = None) -> Floats:
         """(n, 3) unit normals; see :func:`quadcurv.vertex_normals`."""

@@ -214,13 +214,6 @@ def test_elements_that_a_library_skips_are_told(tmp_path):
         assert read(tmp_path / "a.inp").faces.tolist() == [[0, 3, 4, 1], [1, 4, 5, 2]]
 
 
-def test_without_meshlane_its_extra_is_named(tmp_path, monkeypatch):
-    (tmp_path / "a.msh").write_text("")
-    monkeypatch.setattr("quadcurv.io.meshlane.isolated", lambda *_: ({"missing": "meshlane"}, {}))
-    with pytest.raises(MeshError, match=r'\.msh needs meshlane: pip install "quadcurv\[formats\]"'):
-        read(tmp_path / "a.msh")
-
-
 # ---------------------------------------------------------------------------------- objects in memory
 
 

@@ -16,6 +16,7 @@ import trimesh
 
 import quadcurv as qc
 from quadcurv import MeshError, PrecisionWarning, QuadGrid, QuadMesh, read, read_values, surfaces, write
+from quadcurv.io.colours import viridis
 from quadcurv.io.replacing import replacing
 
 SUFFIXES = ["ply", "obj", "off", "vtp", "vtu", "vtk", "vtkhdf", "glb"]
@@ -243,6 +244,33 @@ def test_the_first_scalars_of_a_ply_file_are_seen_as_colours(tmp_path, mesh):
     given = dict(zip(("red", "green", "blue"), np.eye(3, len(mesh.points), dtype=np.uint8), strict=True))
     write(tmp_path / "a.ply", mesh, {"H": H, **given})
     assert list(read_values(tmp_path / "a.ply")) == ["H", "red", "green", "blue"]
+
+
+def test_colours_of_files_are_those_of_viridis():
+    from matplotlib import colormaps
+
+    values = np.linspace(-1, 1, 1001)
+    share = np.clip((values + 0.96) / 1.92, 0, 1)
+    expected = colormaps["viridis"](share, bytes=True).astype(int)
+    np.testing.assert_allclose(viridis(values).astype(int), expected, atol=6)
+    assert viridis(np.full(3, np.nan)).tolist() == [[128, 128, 128, 255]] * 3
+    assert viridis(np.ones(2)).tolist() == [[68, 1, 84, 255]] * 2
+
+
+def test_files_with_values_need_no_extra(tmp_path):
+    code = f"""
+import sys
+for name in ("matplotlib", "pyvista", "vtk", "vtkmodules", "meshlane", "pymeshlab"):
+    sys.modules[name] = None
+import numpy as np, quadcurv as qc
+mesh = qc.surfaces.torus().sample((6, 5), "faces")[0]
+for suffix in ("ply", "vtp", "vtu", "vtk", "glb"):
+    qc.write({str(tmp_path)!r} + "/a." + suffix, mesh, {{"H": np.arange(30.0)}})
+print(qc.read_values({str(tmp_path)!r} + "/a.ply")["H"].sum())
+"""
+    run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, env=_env())
+    assert run.stdout.split() == ["435.0"], run.stderr
+    assert len(os.listdir(tmp_path)) == 5
 
 
 def test_polygons_of_many_sides_are_written(tmp_path):

@@ -14,7 +14,6 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from quadcurv.extras import need
 from quadcurv.mesh import QuadMesh
 from quadcurv.types import Bools, Indices, Ints, MeshError, MeshWarning
 
@@ -242,27 +241,6 @@ def checked_values(name: str, values: NDArray[Any], shape: tuple[int, ...]) -> N
     if values.shape not in (shape, (*shape, 3)):
         raise MeshError(f"{name}: shape {values.shape}, expected {shape} or {(*shape, 3)}")
     return values
-
-
-def colours(values: NDArray[Any], colormap: str = "viridis") -> NDArray[np.uint8]:
-    """RGBA of scalars over the range from their 2nd to their 98th percentile; grey where not finite."""
-    need("matplotlib")
-    from matplotlib import colormaps
-
-    if colormap not in colormaps:
-        raise ValueError(f"colormap: matplotlib has no {colormap!r}")
-    finite = np.isfinite(values)
-    rgba = np.full((len(values), 4), (128, 128, 128, 255), np.uint8)
-    if finite.any():
-        known = values[finite].astype(float)
-        low, high = np.percentile(known, (2, 98))
-        if not low < high:  # all but a few are equal
-            low, high = known.min(), known.max()
-        with np.errstate(over="ignore"):
-            rgba[finite] = colormaps[colormap](
-                np.clip((known - low) / ((high - low) or 1.0), 0, 1), bytes=True
-            )
-    return rgba
 
 
 def warn(message: str, kind: type[MeshWarning] = MeshWarning) -> None:

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from quadcurv.io import trimesh as adapter
 from quadcurv.io.base import Content, Format, Values, register, warn
+from quadcurv.io.colours import viridis
 from quadcurv.io.isolation import isolated
 from quadcurv.io.quads import quads_by_order
 from quadcurv.mesh import QuadMesh
@@ -80,7 +81,7 @@ def write_glb(path: Path, mesh: QuadMesh, values: Values) -> None:
         if not known.all():
             surface.vertex_attributes[name + KNOWN] = known.astype(np.float32)
         if array.ndim == 1 and not coloured:
-            adapter.show(surface, array, "viridis")
+            adapter.show(surface, viridis(array))
             coloured = True
     path.write_bytes(surface.export(file_type="glb"))
 

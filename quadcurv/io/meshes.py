@@ -313,19 +313,25 @@ def write(path: str | os.PathLike[str], mesh: Any, point_data: Mapping[str, Arra
     Parameters
     ----------
     path : path-like
-        ========  ======  ============  ========================================================
-        suffix    quads   positions     values
-        ========  ======  ============  ========================================================
-        .ply      kept    double        double; vectors as NAME_x, NAME_y, NAME_z, but "normal"
-                                        as nx, ny, nz. Integers and booleans stay such.
-                                        Of scalars MeshLab reads the one named "quality"
-        .vtp      kept    double        as they are
-        .obj      kept    double        none
-        .off      kept    double        none
-        .glb      cut     single        single, finite only, as _NAME; the first scalars also as
-                                        colours. :func:`read` puts the quads together again
-        ========  ======  ============  ========================================================
+        =====================  ======  =========  =================================================
+        suffix                 quads   positions  values
+        =====================  ======  =========  =================================================
+        .ply                   kept    double     as they are up to double; vectors as NAME_x,
+                                                  NAME_y, NAME_z, but "normal" as nx, ny, nz. The
+                                                  first scalars are shown in colours too, which is
+                                                  what pyvista, ParaView, trimesh and MeshLab see;
+                                                  MeshLab also reads the one named "quality",
+                                                  Blender all of them
+        .vtp .vtu .vtk         kept    double     as they are; .vtkhdf is written by VTK, the extra
+        .vtkhdf                                   "view"
+        .obj .off              kept    double     none
+        .glb                   cut     single     single, as _NAME; the first scalars also as
+                                                  colours. Where a value is NaN it is 0, the colour
+                                                  grey, and _NAME_known 0
+        =====================  ======  =========  =================================================
 
+        Polygons of more than four sides are kept where quads are. What is written as .glb, .ply or by VTK
+        gives the same values in :func:`read_values`, and the quads of .glb are put together again.
     mesh : object
         Anything :func:`as_mesh` takes but a StaggeredGrid; a grid is written as its faces, row by row.
     point_data : mapping of str to (n,) or (n, 3) array_like
@@ -334,9 +340,15 @@ def write(path: str | os.PathLike[str], mesh: Any, point_data: Mapping[str, Arra
     Raises
     ------
     MeshError
-        A ValueError: values of another shape, or that the format cannot hold; an unknown suffix.
+        A ValueError: values of another shape; names or values that the format cannot hold; an unknown
+        suffix.
     OSError
-        It cannot be written.
+        It cannot be written. An old file is then still there: the new one is written beside and renamed.
+
+    Warns
+    -----
+    PrecisionWarning
+        Values or positions lose more than their last digits in the format.
 
     Examples
     --------

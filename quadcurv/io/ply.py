@@ -15,7 +15,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from quadcurv.io.base import Content, FaceList, Format, Values, colours, polygons, register, warn
+from quadcurv.io.base import Content, FaceList, Format, Values, polygons, register, warn
+from quadcurv.io.colours import viridis
 from quadcurv.io.text import numbers, runs
 from quadcurv.mesh import QuadMesh
 from quadcurv.types import Indices, MeshError, PrecisionWarning
@@ -307,7 +308,7 @@ def write_ply(path: Path, mesh: QuadMesh, values: Values) -> None:
     scalars = next((name for name, array_ in values.items() if array_.ndim == 1), None)
     if scalars is not None and not set(COLOURS) & set(columns):
         header.append(f"comment {COLOURS_OF}{scalars}")
-        columns.update(zip(COLOURS, colours(values[scalars]).T, strict=True))
+        columns.update(zip(COLOURS, viridis(values[scalars]).T, strict=True))
     vertices = np.empty(len(mesh.points), [(name, _stored(name, column)) for name, column in columns.items()])
     for name, column in columns.items():
         vertices[name] = column

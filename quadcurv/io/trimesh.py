@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from quadcurv.io import loaded
-from quadcurv.io.base import Content, Library, checked_values, colours, is_a, register
+from quadcurv.io.base import Content, Library, checked_values, is_a, register
+from quadcurv.io.colours import colours
 from quadcurv.io.quads import quads_by_carrier, quads_by_order, split_quads
 from quadcurv.mesh import QuadMesh
 from quadcurv.types import MeshError
@@ -118,14 +119,14 @@ def attach(mesh: Any, name: str, values: NDArray[Any], colormap: str | None) -> 
     values = checked_values(name, values, (len(mesh.vertices),))
     mesh.vertex_attributes[name] = values.copy()
     if colormap is not None and values.ndim == 1:
-        show(mesh, values, colormap)
+        show(mesh, colours(values, colormap))
 
 
-def show(mesh: Any, values: NDArray[Any], colormap: str) -> None:
-    """Colours of scalars as the visual of a Trimesh."""
+def show(mesh: Any, rgba: NDArray[np.uint8]) -> None:
+    """Colours of the vertices as the visual of a Trimesh."""
     from trimesh.visual import ColorVisuals
 
-    mesh.visual = ColorVisuals(mesh, vertex_colors=colours(values, colormap))
+    mesh.visual = ColorVisuals(mesh, vertex_colors=rgba)
 
 
 register(Library(("trimesh",), content, attach))
