@@ -16,7 +16,7 @@ MODULES = sorted(PACKAGE.rglob("*.py"))
 HEAVY = {"trimesh", "pymeshlab", "pyvista", "igl", "matplotlib", "vtk", "vtkmodules", "meshlane"}
 # Rooms (a module or a package) from the lowest floor up: a room imports from lower floors, or within itself.
 FLOORS = [
-    ["extras", "types"],
+    ["extras", "html", "types"],
     ["kernels"],
     ["coincidence", "polygons", "stencils"],
     ["checks"],
