@@ -13,7 +13,7 @@ import quadcurv as qc
 
 PACKAGE = Path(__file__).parents[1] / "quadcurv"
 MODULES = sorted(PACKAGE.rglob("*.py"))
-HEAVY = {"trimesh", "pymeshlab", "pyvista", "igl", "matplotlib", "vtk", "vtkmodules", "meshlane"}
+HEAVY = {"trimesh", "pymeshlab", "pyvista", "igl", "matplotlib", "vtk", "vtkmodules", "meshlane", "pandas"}
 # Rooms (a module or a package) from the lowest floor up: a room imports from lower floors, or within itself.
 FLOORS = [
     ["extras", "html", "types"],

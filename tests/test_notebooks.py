@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import sys
 from html.parser import HTMLParser
 
 import numpy as np
@@ -97,3 +98,21 @@ def test_curvatures_of_nothing_and_without_errors():
 def test_nothing_is_read_as_markup():
     assert "&lt;b&gt;" in html.table("<b>", [("<i>", "&")])
     assert "<i>" not in html.table("<b>", [("<i>", "&")])
+
+
+def test_data_frames():
+    pytest.importorskip("pandas")
+    frame = SHOWN["comparison"].to_dataframe()
+    assert list(frame["valence"].unique()) == ["all", "3", "4"]
+    best = frame[(frame.scheme == "jet") & (frame.valence == "all")]
+    assert best["inf"].item() == SHOWN["comparison"].norms()["jet"]["inf"]
+    frame = SHOWN["convergence"].to_dataframe()
+    rates = frame[frame.norm == "inf"]["rate"]
+    assert rates.iloc[-1] == SHOWN["convergence"].rates("liu", "inf")[-1]
+
+
+def test_data_frames_name_their_extra(monkeypatch):
+    monkeypatch.setitem(sys.modules, "pandas", None)
+    for name in ("comparison", "convergence"):
+        with pytest.raises(ImportError, match=r'pandas is not installed: pip install "quadcurv\[notebook\]"'):
+            SHOWN[name].to_dataframe()
