@@ -19,6 +19,7 @@ from quadcurv import drivers
 from quadcurv.boundary import checked_boundary, one_rings
 from quadcurv.curvature import dual_areas
 from quadcurv.drivers import direct, fits
+from quadcurv.extras import need
 from quadcurv.io import as_mesh
 from quadcurv.mesh import Mesh
 from quadcurv.precision import warn_of_rounding
@@ -192,13 +193,28 @@ class Comparison:
 
     def to_csv(self, path: str | Path) -> None:
         """Write one row a scheme and valence ("all" included): norms of the errors over how many vertices."""
+        write_csv(path, by_column(self._rows()))
+
+    def to_dataframe(self) -> Any:
+        """Return a pandas.DataFrame of what :meth:`to_csv` writes.
+
+        Raises
+        ------
+        ImportError
+            pandas, of the extra "notebook", is not installed.
+        """
+        need("pandas")
+        import pandas as pd
+
+        return pd.DataFrame(self._rows())
+
+    def _rows(self) -> list[dict[str, Any]]:
         groups = {"all": self.norms(), **{str(v): e for v, e in self.by_valence().items()}}
-        rows = [
+        return [
             {"scheme": name, "valence": group, **values}
             for group, by_scheme in groups.items()
             for name, values in by_scheme.items()
         ]
-        write_csv(path, by_column(rows))
 
     def tables(self) -> list[Table]:
         """Rich tables, 80 columns at most: curvature and norms by scheme, by valence, by pair."""

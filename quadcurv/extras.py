@@ -10,6 +10,7 @@ _EXTRAS = {
     "vtkmodules": "view",
     "meshlane": "formats",
     "pymeshlab": "meshlab",
+    "pandas": "notebook",
 }
 
 

@@ -15,6 +15,7 @@ from rich.table import Table
 
 from quadcurv.comparison import NORMS, Evaluation, norms, schemes_of
 from quadcurv.curvature import dual_areas, gaussian_curvature, principal_curvatures
+from quadcurv.extras import need
 from quadcurv.schemes import Scheme
 from quadcurv.surfaces import SURFACES, Surface
 from quadcurv.tables import as_html, by_column, finite, progress, short, text_table, write_csv
@@ -231,6 +232,19 @@ class Convergence:
     def to_csv(self, path: str | Path) -> None:
         """Write :meth:`rows` to a CSV file."""
         write_csv(path, by_column(self.rows()))
+
+    def to_dataframe(self) -> Any:
+        """Return a pandas.DataFrame of :meth:`rows`.
+
+        Raises
+        ------
+        ImportError
+            pandas, of the extra "notebook", is not installed.
+        """
+        need("pandas")
+        import pandas as pd
+
+        return pd.DataFrame(self.rows())
 
     def table(self, norm: str = "one") -> Table:
         """Rich table of one norm: errors, below them successive rates, at the end the fitted one.

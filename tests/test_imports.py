@@ -13,10 +13,10 @@ import quadcurv as qc
 
 PACKAGE = Path(__file__).parents[1] / "quadcurv"
 MODULES = sorted(PACKAGE.rglob("*.py"))
-HEAVY = {"trimesh", "pymeshlab", "pyvista", "igl", "matplotlib", "vtk", "vtkmodules", "meshlane"}
+HEAVY = {"trimesh", "pymeshlab", "pyvista", "igl", "matplotlib", "vtk", "vtkmodules", "meshlane", "pandas"}
 # Rooms (a module or a package) from the lowest floor up: a room imports from lower floors, or within itself.
 FLOORS = [
-    ["extras", "types"],
+    ["extras", "html", "types"],
     ["kernels"],
     ["coincidence", "polygons", "stencils"],
     ["checks"],

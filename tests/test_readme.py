@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 import subprocess
 import sys
+import tomllib
 from pathlib import Path
 
 import numpy as np
@@ -54,11 +55,30 @@ def test_compare_command(example):
     assert "finite_volume" in run.stdout
 
 
-def test_links_and_names_exist():
-    for target in re.findall(r"\]\(([^)#:]+)\)", README):
+def test_own_file_in_three_commands(example):
+    """The last of them as written; all three, in a clone, below."""
+    lines = command("own").splitlines()
+    assert len(lines) == 3
+    tool = Path(sys.executable).parent / "quadcurv"
+    words = lines[2].removeprefix(".venv/bin/quadcurv ").split()
+    run = subprocess.run([tool, *words], capture_output=True, text=True, timeout=300, check=False)
+    assert run.returncode == 0, run.stderr
+    assert Path("map.html").read_text()[:15].lower() == "<!doctype html>"
+
+
+def test_names_exist():
+    """There are no links, which would not hold on an index page, but for the picture."""
+    assert re.findall(r"\]\(([^)]+)\)", README) == ["examples/readme.png"]
+    for target in re.findall(r"`((?:comparisons|examples)/[\w./]+\.\w+|[A-Z]+\.\w+)`", README):
         assert (ROOT / target).exists(), target
     for module in re.findall(r"-m (comparisons\.\w+)", README):
-        assert (ROOT / (module.replace(".", "/") + ".py")).exists(), module
+        place = ROOT / module.replace(".", "/")
+        assert place.is_dir() or place.with_suffix(".py").exists(), module
+
+
+def test_extras_exist():
+    declared = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["optional-dependencies"]
+    assert set(re.findall(r'"\.\[(\w+)\]"', README)) <= set(declared)
 
 
 def test_ci_runs_the_readme_test_command():
@@ -78,3 +98,16 @@ def test_main_command_in_a_clean_clone(tmp_path):
     assert (clone / "comparisons" / "output" / "figure_4_4.png").exists()
     assert (clone / "comparisons" / "output" / "pillow_error_maps.html").exists()
     assert "reproduced" in run.stdout
+
+
+@pytest.mark.slow
+def test_own_file_in_a_clean_clone(example, tmp_path):
+    clone = tmp_path / "clone"
+    subprocess.run(["git", "clone", "--quiet", ROOT, clone], check=True)
+    (clone / "mesh.obj").write_bytes(Path("mesh.obj").read_bytes())
+    script = "set -e\n" + command("own")
+    run = subprocess.run(
+        ["bash", "-c", script], cwd=clone, capture_output=True, text=True, timeout=1200, check=False
+    )
+    assert run.returncode == 0, run.stderr
+    assert (clone / "map.html").stat().st_size > 10_000

@@ -80,6 +80,14 @@ def one_rings(mesh: Mesh, boundary: str = "extrapolate") -> Stencils:
     ------
     ValueError
         Unknown boundary.
+
+    Examples
+    --------
+    >>> import quadcurv as qc
+    >>> ball, _, _ = qc.surfaces.cubed_sphere().sample((4, 4), "faces")
+    >>> stencils = qc.one_rings(ball)
+    >>> stencils.n, bool(stencils.closed.all())
+    (98, True)
     """
     return _treated(mesh, boundary)[0]
 
@@ -103,6 +111,14 @@ def boundary_treatment(mesh: Mesh, boundary: str = "extrapolate") -> NDArray[np.
     ------
     ValueError
         As for :func:`one_rings`.
+
+    Examples
+    --------
+    >>> import quadcurv as qc
+    >>> sheet, _, _ = qc.surfaces.hyperbolic_paraboloid().sample((8, 8))
+    >>> qc.boundary_treatment(sheet)[:2, :3]
+    array([[2, 2, 2],
+           [2, 1, 1]], dtype=uint8)
     """
     return mesh.in_shape(_treated(mesh, boundary)[1])
 

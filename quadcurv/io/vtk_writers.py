@@ -14,6 +14,7 @@ from xml.sax.saxutils import quoteattr
 import numpy as np
 from numpy.typing import NDArray
 
+from quadcurv.extras import need
 from quadcurv.io.base import FaceList, Format, Values, register
 from quadcurv.io.cells import POLYGON
 from quadcurv.io.isolation import isolated
@@ -198,6 +199,7 @@ def _percent(name: str) -> str:
 
 def write_vtkhdf(path: Path, mesh: QuadMesh, values: Values) -> None:
     """PolyData in HDF5, by VTK from a .vtp file beside."""
+    need("vtkmodules")
     beside = path.with_suffix(".vtp")
     try:
         write_vtp(beside, mesh, values)

@@ -11,6 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from quadcurv import html
 from quadcurv.checks import Finding, Report, checked_points, unit_roundoff
 from quadcurv.connectivity import Connectivity, connect
 from quadcurv.stencils import Stencils
@@ -106,6 +107,9 @@ class QuadMesh:
         kinds = f"{len(self.faces) - triangles} quads" + (f", {triangles} triangles" if triangles else "")
         return f"QuadMesh({len(self.points)} points, {kinds})"
 
+    def _repr_html_(self) -> str:
+        return summary_table(repr(self), self.points, self.report)
+
     @property
     def faces(self) -> Ints:
         """(m, 4) int32, read-only: the faces computed with; a triangle's last entry is -1."""
@@ -187,6 +191,14 @@ class QuadMesh:
         kept = {name: self.__dict__[name] for name in ("points", "connectivity", "recovery", "roundoff")}
         mesh.__dict__.update(kept | changed)
         return mesh
+
+
+def summary_table(title: str, points: Floats, report: Report) -> str:
+    """What a notebook shows of a mesh: its extent and what was mended."""
+    x = points.reshape(-1, 3)
+    low, high = np.nanmin(x, axis=0), np.nanmax(x, axis=0)
+    rows = [(name, f"{a:.4g} to {b:.4g}") for name, a, b in zip("xyz", low, high, strict=True)]
+    return html.table(title, [*rows, ("report", str(report))])
 
 
 def _volume(points: Floats, faces: Ints) -> float:

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from quadcurv.checks import Report, checked_wrap, masked_points, unit_roundoff
-from quadcurv.mesh.face_list import QuadMesh, warn_of
+from quadcurv.mesh.face_list import QuadMesh, summary_table, warn_of
 from quadcurv.stencils import Stencils, grid_faces
 from quadcurv.types import Bools, Floats, MeshError
 
@@ -89,6 +89,9 @@ class QuadGrid:
     def __repr__(self) -> str:
         masked = f", {np.count_nonzero(self.mask)} masked" if self.mask is not None else ""
         return f"QuadGrid({self.shape[0]} x {self.shape[1]} points, wrap={self.wrap}{masked})"
+
+    def _repr_html_(self) -> str:
+        return summary_table(repr(self), self.points, self.report)
 
     @property
     def shape(self) -> tuple[int, int]:

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from quadcurv.checks import Report, checked_points, checked_wrap, unit_roundoff
+from quadcurv.mesh.face_list import summary_table
 from quadcurv.stencils import Stencils
 from quadcurv.types import Floats, Ints, MeshError
 
@@ -82,6 +83,9 @@ class StaggeredGrid:
 
     def __repr__(self) -> str:
         return f"StaggeredGrid({self.shape[0]} x {self.shape[1]} cells, wrap={self.wrap})"
+
+    def _repr_html_(self) -> str:
+        return summary_table(repr(self), self.dual, self.report)
 
     @property
     def report(self) -> Report:

@@ -9,6 +9,7 @@ from typing import Literal, NamedTuple, Protocol
 import numpy as np
 import scipy
 
+from quadcurv import html
 from quadcurv.stencils import Stencils
 from quadcurv.types import Bools, Floats, Indices, Ints
 
@@ -141,6 +142,20 @@ class Curvatures:
     noise: Floats | None = None
     degree: Ints | None = None
     rings: Ints | None = None
+
+    def _repr_html_(self) -> str:
+        """What a notebook shows: the range of every curvature, and how many vertices have none."""
+        errors = self.standard_error
+        rows = []
+        for symbol, name in (("H", "mean"), ("K", "gaussian"), ("k1", "k1"), ("k2", "k2")):
+            known = (values := np.ravel(getattr(self, name)))[np.isfinite(values)]
+            ends = np.quantile(known, (0, 0.5, 1)) if known.size else [np.nan] * 3
+            deviation = np.ravel(getattr(errors, name)) if errors is not None else np.empty(0)
+            deviation = deviation[np.isfinite(deviation)]
+            bar = f"{np.median(deviation):.1e}" if deviation.size else "-"
+            rows.append((symbol, *(f"{end:.4g}" for end in ends), bar, str(values.size - known.size)))
+        header = ("", "min", "median", "max", "standard error", "without")
+        return html.table(f"Curvatures at {np.size(self.mean)} vertices", rows, header)
 
     @property
     def shape_index(self) -> Floats:
