@@ -27,6 +27,7 @@ from quadcurv.boundary.mirror import mirrored
 from quadcurv.boundary.poles import closed_grid, parts_at_poles, poles
 from quadcurv.boundary.sides import cell_ghosts, frame, ghost_layer
 from quadcurv.boundary.strips import ghosts
+from quadcurv.boundary.strips import roughness as rough_lines
 from quadcurv.boundary.surface import fitted
 from quadcurv.mesh import Mesh, QuadGrid, StaggeredGrid
 from quadcurv.stencils import Stencils
@@ -159,5 +160,23 @@ def _ghosted_cells(grid: StaggeredGrid) -> tuple[Stencils, NDArray[np.uint8]]:
 
 
 def roughness(mesh: Mesh) -> Floats:
-    """To be written."""
-    raise NotImplementedError
+    """How rough the lines of points are that end at the border: a bound of the error there.
+
+    Parameters
+    ----------
+    mesh : QuadMesh, QuadGrid or StaggeredGrid
+
+    Returns
+    -------
+    (n,) or (r, c) float64
+        The length of X_0 - 4 X_1 + 6 X_2 - 4 X_3 + X_4 over that of X_1 - X_0, plus its part along the normal
+        once more, over what the surface turns there; the largest of the lines around the vertex. 0
+        inside, NaN in an open ring and where no such lines end. Below one half the error of the mean
+        curvature, by a scheme that converges and beyond the error it has inside, is at most twice this
+        part of the larger principal curvature; from one half on nothing is said.
+    """
+    if isinstance(mesh, StaggeredGrid):
+        if mesh.has_ghosts:
+            return np.zeros(mesh.shape)
+        mesh = QuadGrid(mesh.primal, mesh.wrap)
+    return mesh.in_shape(rough_lines(mesh.stencils()))

@@ -16,11 +16,16 @@ import numpy as np
 from quadcurv.types import Bools, Floats, Indices
 
 NODES = 6  # of a line; the last one may be missing
-SMOOTH = 0.15  # squares of what the last two points change, on a line and those beside it
-# Where the last point changes less than the last but one, there is little noise: then what a fitted surface
-# leaves at the points is but a third of what it misses beyond the border. Squares, again.
+# A line is smooth where, in squares, the last point changes less than this part of what the last but one does;
+# along the normal, where noise of the surface shows, but for this part of all the last but one does.
+SMOOTH, HIDDEN = 0.15, 0.002
+ROUNDING = 2.0**-92  # of coordinates, as extrapolation magnifies it
+# Fourth-order schemes ask for more: the last point changes no more than this, squared, of what the changes of
+# the two points before it, as a geometric series, lead to expect.
+_EXPECTED = 9.0
+# Where the last point changes less than the last but one there is little noise: then what a fitted surface
+# leaves at the points is but a third of what it misses beyond the border.
 _CALM, _FAITHFUL = 0.6, 0.1
-ROUNDING = 2.0**-92  # of coordinates, as extrapolation magnifies it; squares, too
 
 
 class Continued(NamedTuple):
@@ -48,36 +53,31 @@ def index_weights(degree: int, layer: int = 1) -> Floats:
     )
 
 
-def extended(
-    lines: Floats, normals: Floats, turn: Floats, degree: int, layers: int, beside: Indices
-) -> Continued:
+def extended(lines: Floats, turn: Floats, degree: int, layers: int, beside: Indices) -> Continued:
     """Continue lines by ghosts.
 
     Parameters
     ----------
     lines : (k, 6, 3) float64
         Points from the border inward; NaN for a sixth one that is missing, if the degree is 4.
-    normals : (k, 3) float64
-        Unit normals of the surface at X_0.
     turn : (k,) float64
-        Sine of the angle by which they turn from there to the next points.
+        Sine of the angle by which the surface turns from X_0 to the next points.
     degree, layers : int
         Of the polynomial; how many ghosts beyond it.
     beside : (m, 2) int64
-        Lines that end beside each other.
+        Lines that end beside each other, all in the same sense.
     """
     x = lines - lines[:, :1]  # an offset costs no digits
-    floor = ROUNDING * (np.square(lines[:, 0]) + np.square(x[:, 4] + lines[:, 0])).sum(axis=1)
-    terms = [np.einsum("j,kjx->kx", w, x[:, : w.size]) for w in _DIFFERENCES]
+    terms = np.stack([np.einsum("j,kjx->kx", w, x[:, : w.size]) for w in _DIFFERENCES])
     every = np.ones(len(lines), bool)
     ghosts = continued(lines[:, : degree + 1], layers, every)
-    error, even = _error(terms, ghosts - lines[:, :1], x, normals, turn, floor, beside, degree)
+    error, even = _error(terms, ghosts - lines[:, :1], lines, turn, beside, degree)
     if even.all():
         return Continued(ghosts, error, even, even)
     s, table = _newton(x)
-    terms = [table[:, k] * np.prod(_beyond(s, 0)[:, None] - s[:, :k], axis=1) for k in (3, 4, 5)]
+    terms = np.stack([table[:, k] * np.prod(_beyond(s, 0)[:, None] - s[:, :k], axis=1) for k in (3, 4, 5)])
     by_length = continued(lines[:, : degree + 1], layers, ~every)
-    other, smooth = _error(terms, by_length - lines[:, :1], x, normals, turn, floor, beside, degree)
+    other, smooth = _error(terms, by_length - lines[:, :1], lines, turn, beside, degree)
     by_index = even | (~smooth & (error <= other))
     ghosts = np.where(by_index[:, None, None], ghosts, by_length)
     return Continued(ghosts, np.where(by_index, error, other), even | smooth, even)
@@ -100,34 +100,47 @@ _DIFFERENCES = [np.array([(-1.0) ** j * comb(order, j) for j in range(order + 1)
 
 
 def _error(
-    terms: list[Floats],
-    ghosts: Floats,
-    x: Floats,
-    normals: Floats,
-    turn: Floats,
-    floor: Floats,
-    beside: Indices,
-    degree: int,
+    terms: Floats, ghosts: Floats, lines: Floats, turn: Floats, beside: Indices, degree: int
 ) -> tuple[Floats, Bools]:
-    """Estimated error of ghosts, relative to X_0, and whether they are smooth beyond doubt."""
-    third, fourth, fifth = (np.einsum("kx,kx->k", d, d) for d in terms)
-    short = np.isnan(fifth)
-    last, before = np.where(short, fourth, fifth), np.where(short, third, fourth)
+    """Estimated error of ghosts, relative to X_0, and whether they are smooth beyond doubt.
+
+    `terms` (3, k, 3) are what the fourth, fifth and sixth point of lines change.
+    """
+    short = np.isnan(terms[2]).any(axis=1, keepdims=True)
+    last, before = np.where(short, terms[1], terms[2]), np.where(short, terms[0], terms[1])
+    inward = lines[:, 1] - lines[:, 0]
     with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
-        steps = np.diff(ghosts, axis=1, prepend=0.0)
-        outward = -np.einsum("klx,kx->kl", steps, x[:, 1])
-        edge = np.einsum("kx,kx->k", x[:, 1], x[:, 1])
-        outside = (outward[:, 0] > 0.2 * edge) & (outward > 0).all(axis=1)
-        outside &= np.einsum("kx,kx->k", ghosts[:, 0], ghosts[:, 0]) < 4 * edge
-        smooth = without_excess(np.where(outside, last - SMOOTH * before - floor, np.inf), beside)
-        # Along the surface an error does harm by as much as the surface turns from point to point.
-        term = np.where(short[:, None], terms[1], terms[2])
-        off = np.einsum("kx,kx->k", term, normals) ** 2 + turn**2 * np.einsum("kx,kx->k", term, term)
-        last, before = _around(last, beside), _around(before, beside)
-        square = _around(off, beside) * np.where(last < _CALM * before, _FAITHFUL, 1.0)
+        normal = np.cross(inward, _sideways(lines[:, 0], beside))
+        normal /= np.linalg.norm(normal, axis=1, keepdims=True)
+        along, all_ = _dot(last, normal) ** 2, _dot(last, last)
+        most = SMOOTH * _dot(before, normal) ** 2 + HIDDEN * _dot(before, before)
         if degree > 4:
-            square *= np.minimum(1, last / before)
-    return np.where(outside & ~np.isnan(square), np.sqrt(square), np.inf), smooth
+            most = np.minimum(most, _EXPECTED * _dot(before, before) ** 2 / _dot(terms[0], terms[0]))
+        excess = np.maximum(all_ - SMOOTH * _dot(before, before), along - most)
+        excess -= ROUNDING * (_dot(lines[:, 0], lines[:, 0]) + _dot(lines[:, 4], lines[:, 4]))
+        steps = np.diff(ghosts, axis=1, prepend=0.0)
+        outward, edge = -np.einsum("klx,kx->kl", steps, inward), _dot(inward, inward)
+        outside = (outward[:, 0] > 0.2 * edge) & (outward > 0).all(axis=1)
+        outside &= _dot(ghosts[:, 0], ghosts[:, 0]) < 4 * edge
+        smooth = without_excess(np.where(outside, excess, np.inf), beside)
+        # Along the surface an error does harm by as much as the surface turns from point to point.
+        square = _around(along + turn**2 * all_, beside)
+        calm = _around(along, beside) < _CALM * _around(_dot(before, normal) ** 2, beside)
+        error = np.sqrt(np.where(calm & (degree < 5), _FAITHFUL, 1.0) * square)
+    return np.where(outside & ~np.isnan(error), error, np.inf), smooth
+
+
+def _dot(a: Floats, b: Floats) -> Floats:
+    return np.einsum("kx,kx->k", a, b)
+
+
+def _sideways(ends: Floats, beside: Indices) -> Floats:
+    """From the end of the line before each to that of the one after it, or its own."""
+    along = np.zeros_like(ends)
+    step = ends[beside[:, 1]] - ends[beside[:, 0]]
+    for k in (0, 1):
+        np.add.at(along, beside[:, k], step)
+    return along
 
 
 def without_excess(excess: Floats, beside: Indices) -> Bools:

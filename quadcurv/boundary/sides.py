@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import scipy
 
-from quadcurv.boundary.lines import NODES, ROUNDING, SMOOTH, index_weights, without_excess
+from quadcurv.boundary.lines import HIDDEN, NODES, ROUNDING, SMOOTH, index_weights, without_excess
 from quadcurv.boundary.stars import bent
 from quadcurv.boundary.surface import fitted
 from quadcurv.mesh import QuadGrid, StaggeredGrid
@@ -119,7 +119,8 @@ def _continue(points: Floats, axis: int, end: int, ghosts: Floats, wraps: bool) 
     first = end * inward * (points.shape[axis] - 1)
     excess = np.empty(size)
     way = inward * (1 - 2 * end)
-    border.continue_side(points, first, along, way, SMOOTH, ROUNDING, ghosts, excess)
+    limits = SMOOTH, HIDDEN, ROUNDING
+    border.continue_side(points, first, along, way, wraps, limits, ghosts, excess)
     return without_excess(excess, _beside(size, wraps)) if excess.max() > 0 else None
 
 

@@ -41,21 +41,51 @@ class Ghosts(NamedTuple):
     smooth: Bools
 
 
+class _Lines(NamedTuple):
+    """Strips of a face list: their sides, and each line of points once.
+
+    Attributes
+    ----------
+    rails : (2 k, NODES) int64
+        The two sides of each strip, see `_strips`.
+    line : (2 k,) int64
+        Which of the lines each of them is: at a side the strips to the left and right share it.
+    vertices : (g, NODES) int64
+        The lines, -1 for missing points.
+    slot, valence, n_edges
+        See `_strips`.
+    """
+
+    rails: Indices
+    line: Indices
+    vertices: Indices
+    slot: Indices
+    valence: Indices
+    n_edges: Indices
+
+    @property
+    def beside(self) -> Indices:
+        """(k, 2) int64: lines that end beside each other."""
+        return self.line.reshape(-1, 2)
+
+
+def _lines(mesh: Stencils, least: int) -> _Lines:
+    rails, slot, valence, n_edges = _strips(mesh, least)
+    long_first = np.argsort(rails[:, -1] < 0, kind="stable")
+    key = rails[long_first, 0] * mesh.n + rails[long_first, 1]
+    _, first, line = np.unique(key, return_index=True, return_inverse=True)
+    line = line[np.argsort(long_first)]
+    return _Lines(rails, line, rails[long_first[first]], slot, valence, n_edges)
+
+
 def ghosts(mesh: Stencils, degree: int = 4, layers: int = 1) -> Ghosts:
     """Continue the strips inward from border edges by `layers` ghosts on polynomials of a degree."""
-    n = mesh.n
-    rails, slot, valence, n_edges = _strips(mesh, degree + 1)
+    n, found = mesh.n, _lines(mesh, degree + 1)
+    rails, line, lines, slot, valence, n_edges = found
     if len(rails) == 0:
         return Ghosts(np.empty((0, 3)), np.empty((0, 4), np.int32), np.full(n, np.inf), np.zeros(n, bool))
-    # One line for each rail X_0, X_1, ...: at a side the strips to the left and right share it.
-    long_first = np.argsort(rails[:, -1] < 0, kind="stable")
-    key = rails[long_first, 0] * n + rails[long_first, 1]
-    _, first, line = np.unique(key, return_index=True, return_inverse=True)
-    lines, line = rails[long_first[first]], line[np.argsort(long_first)]
     x = np.where(lines[..., None] >= 0, mesh.points[lines], np.nan)
-    normals, turn = _normals(mesh)
-    at = lines[:, 0]
-    beside = extended(x, normals[at], turn[at], degree, layers, line.reshape(-1, 2))
+    beside = extended(x, _normals(mesh)[1][lines[:, 0]], degree, layers, found.beside)
     outward = np.concatenate((rails[:, :1], n + layers * line[:, None] + np.arange(layers)), axis=1)
     quads = _block_quads(outward.reshape(-1, 2, layers + 1).transpose(0, 2, 1)[..., ::-1], slot)
 
@@ -90,6 +120,26 @@ def ghosts(mesh: Stencils, degree: int = 4, layers: int = 1) -> Ghosts:
     ghosts = np.concatenate((beside.ghosts.reshape(-1, 3), points.reshape(-1, 3)))
     error[~closed] = np.inf
     return Ghosts(ghosts, np.concatenate((quads, corner_quads)), error, smooth & closed)
+
+
+def roughness(mesh: Stencils) -> Floats:
+    """(n,): see `quadcurv.boundary.roughness`; NaN where no strips end at both sides of a border vertex."""
+    found, n = _lines(mesh, 5), mesh.n
+    rough = np.where(mesh.closed, 0.0, np.nan)
+    if len(found.rails) == 0:
+        return rough
+    x = mesh.points[found.vertices[:, :5]]
+    normals, turn = _normals(mesh)
+    at = found.vertices[:, 0]
+    difference = np.einsum("j,kjx->kx", [1, -4, 6, -4, 1], x - x[:, :1])
+    edge = np.linalg.norm(x[:, 1] - x[:, 0], axis=1)
+    along, across = np.linalg.norm(difference, axis=1), np.einsum("kx,kx->k", difference, normals[at])
+    with np.errstate(divide="ignore", invalid="ignore"):
+        of_line = along / edge + np.where(across == 0, 0.0, 4 * np.abs(across) / (edge * turn[at]))
+    worst = np.zeros(n)
+    np.maximum.at(worst, found.rails[:, 0], of_line[found.beside].max(axis=1).repeat(2))
+    served = np.bincount(found.rails[:, 0], minlength=n) == 2
+    return np.where(served, worst, rough)
 
 
 def _normals(mesh: Stencils) -> tuple[Floats, Floats]:

@@ -4,6 +4,7 @@ from math import inf
 
 from quadcurv.kernels.compiled import flat, kernel
 from quadcurv.kernels.formulas import formula, span, where
+from quadcurv.kernels.vector import apart, cross, dot, less, place, plus, triple
 
 
 def continued(line):
@@ -20,31 +21,33 @@ def continued(line):
 
 
 @formula(contract=True)
-def continue_lines(points, first, along, inward, count, smooth, rounding, ghosts, excess):
+def continue_lines(points, first, along, inward, count, wraps, smooth, hidden, rounding, ghosts, excess):
     """A ghost and an excess for each line."""
     for k in span(0, count):
         at = first + along * k
-        over = outward = edge = step = 0.0
-        for i in range(3):
-            x = points[at + i]
-            line = [points[at + inward * j + i] - x for j in range(6)]
-            ghost, fourth, fifth = continued(line)
-            last = x + line[4]
-            over += fifth * fifth - smooth * (fourth * fourth) - rounding * (x * x + last * last)
-            outward -= ghost * line[1]
-            edge += line[1] * line[1]
-            step += ghost * ghost
-            ghosts[3 * k + i] = x + ghost
-        outside = (outward > 0.2 * edge) & (step < 4.0 * edge)
+        before = where(k > 0, at - along, where(wraps, first + along * (count - 1), at))
+        after = where(k < count - 1, at + along, where(wraps, first, at))
+        x = triple(points, at, 1)
+        line = [less(triple(points, at + inward * j, 1), x) for j in range(6)]
+        ghost, fourth, fifth = zip(*map(continued, zip(*line, strict=True)), strict=True)
+        place(ghosts, 3 * k, 1, plus(x, ghost))
+        a, last = line[1], plus(x, line[4])
+        normal = cross(a, apart(points, after, points, before, 1))
+        ahead, behind = dot(fifth, fifth), dot(fourth, fourth)
+        p, q = dot(fifth, normal), dot(fourth, normal)
+        up = (p * p - smooth * (q * q)) / dot(normal, normal) - hidden * behind
+        over, edge = ahead - smooth * behind, dot(a, a)
+        over = where(up > over, up, over) - rounding * (dot(x, x) + dot(last, last))
+        outside = (dot(ghost, a) < -0.2 * edge) & (dot(ghost, ghost) < 4.0 * edge) & (over == over)
         excess[k] = where(outside, over, inf)
 
 
 @kernel
-def _continue_lines(points, first, along, inward, count, smooth, rounding, ghosts, excess):
-    continue_lines(points, first, along, inward, count, smooth, rounding, ghosts, excess)
+def _continue_lines(points, first, along, inward, count, wraps, smooth, hidden, rounding, ghosts, excess):
+    continue_lines(points, first, along, inward, count, wraps, smooth, hidden, rounding, ghosts, excess)
 
 
-def continue_side(points, first, along, inward, smooth, rounding, ghosts, excess):
+def continue_side(points, first, along, inward, wraps, limits, ghosts, excess):
     """One ghost beyond each line that ends at a side, and whether it is right.
 
     Parameters
@@ -52,13 +55,15 @@ def continue_side(points, first, along, inward, smooth, rounding, ghosts, excess
     points : float64
     first, along, inward : int
         Point j of line k begins at number ``first + along * k + inward * j``; each has at least six.
-    smooth, rounding : float
-        See quadcurv.boundary.lines.
+    wraps : bool
+        Whether the first line is beside the last one.
+    limits : (float, float, float)
+        SMOOTH, HIDDEN and ROUNDING of quadcurv.boundary.lines.
     ghosts : (count, 3) float64
         Written to.
     excess : (count,) float64
         Written to: the square of what the sixth point changes, less the most that it may; infinite where the
         ghost does not lie outside.
     """
-    count = excess.size
-    _continue_lines(flat(points), first, along, inward, count, smooth, rounding, ghosts.reshape(-1), excess)
+    sizes = first, along, inward, excess.size, wraps
+    _continue_lines(flat(points), *sizes, *limits, ghosts.reshape(-1), excess)
