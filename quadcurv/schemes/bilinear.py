@@ -23,7 +23,8 @@ def local(x: Floats) -> tuple[Floats, Floats]:
     """Matrices and lumped masses of quads (m, 4, 3), or of linear triangles (m, 3, 3)."""
     if x.shape[1] == 3:
         return linear(x)
-    tangents = np.tensordot(_SLOPES, x.T, ((2,), (1,)))  # (direction, point, 3, m)
+    # Relative to a corner: slopes sum to zero, but only up to rounding.
+    tangents = np.tensordot(_SLOPES, (x - x[:, :1]).T, ((2,), (1,)))  # (direction, point, 3, m)
     u, v = np.moveaxis(tangents, 2, 1)
     uu, uv, vv = dot(u, u), dot(u, v), dot(v, v)
     area = length(cross(u, v), uu + vv, squared_distance(x))

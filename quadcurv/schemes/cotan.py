@@ -105,7 +105,7 @@ def _by_libigl(x: Floats, area: str) -> tuple[Floats, Floats]:
     # The sum of the squared edges is twice that of the cotans times twice the area.
     thin = np.flatnonzero(~(4 * weights.sum(axis=1) < 1 / _THIN))
     if thin.size:
-        own, double = half_cotans(*x[thin].transpose(1, 2, 0), squared_distance(x[thin]))
+        own, double = half_cotans(x[thin].transpose(1, 2, 0), squared_distance(x[thin]))
         weights[thin] = own.T
         parts[thin] = voronoi(own, double).T if area == "voronoi" else double[:, None] / 6
     return np.tensordot(weights, EDGES, 1), parts

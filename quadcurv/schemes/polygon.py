@@ -58,9 +58,8 @@ def bunge() -> Laplacian:
         else:
             virtual = _virtual_vertex(arm)
             weights = 1 / k + _least_weights(arm, virtual)
-        halves, double = half_cotans(
-            arm, np.roll(arm, -1, axis=1), np.broadcast_to(virtual[:, None], arm.shape), squared_distance(x)
-        )
+        fan = arm, np.roll(arm, -1, axis=1), np.broadcast_to(virtual[:, None], arm.shape)
+        halves, double = half_cotans(fan, squared_distance(x))
         own, following, middle = voronoi(halves, double)
         parts = own + np.roll(following, 1, axis=0) + weights * middle.sum(axis=0)
         if k == 3:

@@ -5,7 +5,7 @@ Vectors are (3, ...) here, coordinates first and faces last, so that numpy works
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 
 import numpy as np
 
@@ -25,7 +25,7 @@ EDGES = np.array(
 
 def linear(x: Floats) -> tuple[Floats, Floats]:
     """Cotan matrices (m, 3, 3) of triangles (m, 3, 3), and a third of their areas at each corner (m, 3)."""
-    weights, double = half_cotans(*x.transpose(1, 2, 0), squared_distance(x))
+    weights, double = half_cotans(x.transpose(1, 2, 0), squared_distance(x))
     return np.tensordot(weights, EDGES, ((0,), (0,))), thirds(weights, double).T
 
 
@@ -39,7 +39,7 @@ def cut_up(x: Floats, areas: Callable[[Floats, Floats], Floats] = thirds) -> tup
     m, k, _ = x.shape
     triangles, polygon = cut(x.reshape(-1, 3), np.arange(0, m * k + 1, k), np.arange(m * k, dtype=np.int32))
     corners = x.reshape(-1, 3)[triangles].transpose(1, 2, 0)
-    weights, double = half_cotans(*corners, squared_distance(x)[polygon])
+    weights, double = half_cotans(corners, squared_distance(x)[polygon])
     matrices, parts, slots = np.zeros((m, k, k)), np.zeros((m, k)), triangles % k
     where = polygon[:, None, None], slots[:, :, None], slots[:, None]
     np.add.at(matrices, where, np.tensordot(weights, EDGES, ((0,), (0,))))
@@ -47,11 +47,12 @@ def cut_up(x: Floats, areas: Callable[[Floats, Floats], Floats] = thirds) -> tup
     return matrices, parts
 
 
-def half_cotans(a: Floats, b: Floats, c: Floats, far: Floats) -> tuple[Floats, Floats]:
+def half_cotans(corners: Iterable[Floats], far: Floats) -> tuple[Floats, Floats]:
     """Halves of the cotans (3, ...) at corners of triangles, and twice their areas (...), NaN without area.
 
-    Corners a, b and c are (3, ...), `far` is the squared distance from the origin of what they belong to.
+    Each of the three corners is (3, ...), `far` the squared distance from the origin of what they belong to.
     """
+    a, b, c = corners
     across_a, across_b, across_c = c - b, a - c, b - a
     aa, bb, cc = (dot(edge, edge) for edge in (across_a, across_b, across_c))
     # Area between the two shortest edges: of a needle nothing cancels.
