@@ -207,8 +207,8 @@ def test_a_fold_has_no_normal(scheme, offset):
             warnings.simplefilter("ignore", qc.PrecisionWarning)
             H = qc.mean_curvature(mesh, scheme).reshape(9, 9)
             normals = qc.vertex_normals(mesh).reshape(9, 9, 3)
-        assert np.isnan(H[4]).all()
-        assert np.isnan(normals[4]).all()
+        assert np.isnan(H[4, 1:-1]).all()
+        assert np.isnan(normals[4, 1:-1]).all()
         assert np.isfinite(H[[2, 6], 2:-2]).all()
 
 
