@@ -124,6 +124,7 @@ def boundary_treatment(mesh: Mesh, boundary: str = "extrapolate") -> NDArray[np.
     return mesh.in_shape(_treated(mesh, boundary)[1])
 
 
+@np.errstate(all="ignore")  # what overflows, or has no length, is NaN and has no ghosts
 def _treated(mesh: Mesh, boundary: str) -> tuple[Stencils, NDArray[np.uint8]]:
     checked_boundary(boundary)
     if isinstance(mesh, QuadGrid) and mesh.mask is not None:
@@ -159,6 +160,7 @@ def _ghosted_cells(grid: StaggeredGrid) -> tuple[Stencils, NDArray[np.uint8]]:
     return treated, treatment.astype(np.uint8)
 
 
+@np.errstate(all="ignore")
 def roughness(mesh: Mesh) -> Floats:
     """How rough the lines of points are that end at the border: a bound of the error there.
 
@@ -179,4 +181,5 @@ def roughness(mesh: Mesh) -> Floats:
         if mesh.has_ghosts:
             return np.zeros(mesh.shape)
         mesh = QuadGrid(mesh.primal, mesh.wrap)
-    return mesh.in_shape(rough_lines(mesh.stencils()))
+    rough = rough_lines(mesh.stencils())
+    return mesh.in_shape(np.where(np.isfinite(rough), rough, np.nan))

@@ -17,6 +17,7 @@ OPEN, INTERIOR, EXTRAPOLATED, FITTED = 0, 1, 2, 3
 REACH = NODES - 1  # faces from the border inward that closing it looks at
 
 
+@np.errstate(all="ignore")  # what overflows, or has no length, is NaN and has no ghosts
 def closed(given: Stencils, pole: Indices | None = None) -> tuple[Stencils, NDArray[np.uint8]]:
     """Stencils with rings closed at the border of a face list, and what closes each.
 

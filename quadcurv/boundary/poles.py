@@ -26,6 +26,7 @@ class Pole(NamedTuple):
     end: int
 
 
+@np.errstate(all="ignore")
 def poles(grid: QuadGrid) -> list[Pole]:
     """The sides of a grid that are one point."""
     found = []
@@ -58,6 +59,7 @@ def closed_grid(grid: QuadGrid, found: list[Pole]) -> tuple[Stencils, NDArray[np
     return closed(welded, pole.ravel())
 
 
+@np.errstate(all="ignore")
 def parts_at_poles(grid: QuadGrid) -> list[tuple[Indices, QuadGrid, Bools]]:
     """Grids of the rows near each pole, their vertices in the whole grid, which of them are at or beside it."""
     number = np.arange(grid.shape[0] * grid.shape[1]).reshape(grid.shape)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import scipy
 
-from quadcurv.boundary.lines import HIDDEN, NODES, ROUNDING, SMOOTH, index_weights, without_excess
+from quadcurv.boundary.lines import HIDDEN, NODES, ROUNDING, SMOOTH, extended, index_weights, without_excess
 from quadcurv.boundary.stars import bent
 from quadcurv.boundary.surface import fitted
 from quadcurv.mesh import QuadGrid, StaggeredGrid
@@ -16,6 +16,7 @@ DEGREE = 4
 _WEIGHTS = index_weights(DEGREE)
 
 
+@np.errstate(all="ignore")
 def ghost_layer(
     points: Floats, wrap: tuple[bool, bool], degree: int = DEGREE, layers: int = 1
 ) -> tuple[Ints, Floats]:
@@ -75,6 +76,7 @@ def _extension(size: int, wraps: bool, degree: int, layers: int) -> scipy.sparse
     return scipy.sparse.vstack((before, identity, after), format="csr")
 
 
+@np.errstate(all="ignore")
 def frame(grid: QuadGrid | StaggeredGrid, boundary: str) -> tuple[Frame, Indices]:
     """Ghosts by index around a grid, NaN where nothing is known; border vertices that they do not serve."""
     points = grid.points if isinstance(grid, QuadGrid) else grid.primal
@@ -140,6 +142,7 @@ def _beside(size: int, wraps: bool) -> Indices:
     return pairs % size if wraps else pairs[:-1]
 
 
+@np.errstate(all="ignore")
 def cell_ghosts(grid: StaggeredGrid) -> tuple[Floats, Bools]:
     """Centres of ghost cells around a staggered grid, (r + 2, c + 2, 3) with its own in the middle.
 
@@ -159,6 +162,11 @@ def cell_ghosts(grid: StaggeredGrid) -> tuple[Floats, Bools]:
         for end, next_, far in ((0, 1, 1), (-1, -2, -2)):
             ghosts = np.empty((size, 3))
             even = _continue(grid.primal, axis, -end, ghosts, grid.wrap[1 - axis])
+            if even is not None and len(inner) >= NODES:
+                lines = np.moveaxis(inner[:: -1 if end else 1][:NODES], 0, 1)
+                found = extended(lines, np.zeros(size), DEGREE, 1, _beside(size, grid.wrap[1 - axis]))
+                smooth = found.smooth & ~even
+                ghosts[smooth], even = found.ghosts[smooth, 0], even | smooth
             at = np.empty(0, int) if even is None else np.flatnonzero(~even)
             if at.size:
                 edges = np.stack((dual[end][at], dual[end][at + 1], dual[far][at], dual[far][at + 1]), axis=1)

@@ -78,6 +78,7 @@ def _lines(mesh: Stencils, least: int) -> _Lines:
     return _Lines(rails, line, rails[long_first[first]], slot, valence, n_edges)
 
 
+@np.errstate(all="ignore")
 def ghosts(mesh: Stencils, degree: int = 4, layers: int = 1) -> Ghosts:
     """Continue the strips inward from border edges by `layers` ghosts on polynomials of a degree."""
     n, found = mesh.n, _lines(mesh, degree + 1)
