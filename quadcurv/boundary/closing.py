@@ -68,12 +68,20 @@ def closed(given: Stencils, pole: Indices | None = None) -> tuple[Stencils, NDAr
         faces.append(index[star.faces])
         size += extra
     table = np.concatenate(faces).astype(np.int32)
+    places = np.concatenate(points)
+    lost = ~np.isfinite(places).all(axis=1)
+    if lost.any():  # ghosts that overflow close nothing
+        bad = np.append(lost, False)[table].any(axis=1)
+        around = table[bad]
+        around = around[(around >= 0) & (around < given.n)]
+        treatment[around[treatment[around] > INTERIOR]] = OPEN
+        places[lost], table = given.points[0], table[~bad | (np.arange(len(table)) < len(given.faces))]
     polygons = given.polygons
     if polygons is not None:
         face = np.pad(polygons.face, (0, len(table) - len(given.faces)), constant_values=-1)
         polygons = polygons._replace(corners=copies[polygons.corners].astype(np.int32), face=face)
     treated = replace(
-        given, points=np.concatenate(points), faces=table, closed=treatment != OPEN, polygons=polygons
+        given, points=places, faces=table, closed=treatment != OPEN, polygons=polygons
     )
     return treated, treatment
 
