@@ -1,18 +1,18 @@
 """Rings at the border, closed.
 
-A vertex at the border has a ring that is open: a scheme knows nothing there until points beyond the border, ghosts,
-close it. With boundary="extrapolate" they come, in this order of preference,
+A vertex at the border has a ring that is open: a scheme knows nothing there until points beyond the border,
+ghosts, close it. With boundary="extrapolate" they come, in this order of preference,
 
 1. by index: the strips of quads inward from the border are continued by the quartic through five points,
-   X_-1 = 5 X_0 - 10 X_1 + 10 X_2 - 5 X_3 + X_4, where the points are smooth functions of their index. The border
-   then has the order and the error of the inside;
+   X_-1 = 5 X_0 - 10 X_1 + 10 X_2 - 5 X_3 + X_4, where the points are smooth functions of their index. The
+   border then has the order and the error of the inside;
 2. by arc length: the same on cumulative chord lengths, where the spacing is not smooth but the lines are;
 3. from a surface: where the strips are rough (a position is off by more than the extrapolation bears), too
-   short, or not to be traced (triangles, extraordinary vertices, re-entrant corners), or where their ghosts do
-   not lie outside, the ghosts are read off a polynomial surface fitted at the vertex.
+   short, or not to be traced (triangles, extraordinary vertices, re-entrant corners), or where their ghosts
+   do not lie outside, the ghosts are read off a polynomial surface fitted at the vertex.
 
-Open stay, and have no curvature: isolated vertices, those of several fans of faces or of an edge of more than two,
-and those whose neighbours are too few for a surface.
+Open stay, and have no curvature: isolated vertices, those of several fans of faces or of an edge of more
+than two, and those whose neighbours are too few for a surface.
 """
 
 from __future__ import annotations

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -80,9 +81,7 @@ def closed(given: Stencils, pole: Indices | None = None) -> tuple[Stencils, NDAr
     if polygons is not None:
         face = np.pad(polygons.face, (0, len(table) - len(given.faces)), constant_values=-1)
         polygons = polygons._replace(corners=copies[polygons.corners].astype(np.int32), face=face)
-    treated = replace(
-        given, points=places, faces=table, closed=treatment != OPEN, polygons=polygons
-    )
+    treated = replace(given, points=places, faces=table, closed=treatment != OPEN, polygons=polygons)
     return treated, treatment
 
 

@@ -1,9 +1,10 @@
 """Lines of points that end at the border, continued by ghosts; and how far these are off.
 
-A polynomial through the first points of a line X_0, X_1, ... is read off beyond X_0: by index, X_-1 = 5 X_0 -
-10 X_1 + 10 X_2 - 5 X_3 + X_4, where the points are smooth functions of their index, else by arc length, on
-cumulative chord lengths, at the mirror images of X_1, X_2. What a sixth point would change tells the error. It is
-clearly less than what the fifth has changed where the line is smooth, twice as much where there is noise.
+A polynomial through the first points of a line X_0, X_1, ... is read off beyond X_0: by index, X_-1 = 5 X_0
+- 10 X_1 + 10 X_2 - 5 X_3 + X_4, where the points are smooth functions of their index, else by arc length,
+on cumulative chord lengths, at the mirror images of X_1, X_2. What a sixth point would change tells the
+error. It is clearly less than what the fifth has changed where the line is smooth, twice as much where
+there is noise.
 """
 
 from __future__ import annotations
@@ -16,7 +17,8 @@ import numpy as np
 from quadcurv.types import Bools, Floats, Indices
 
 NODES = 6  # of a line; the last one may be missing
-# A line is smooth where, in squares, the last point changes less than this part of what the last but one does;
+# A line is smooth where, in squares, the last point changes less than this part of what the last but one
+# does;
 # along the normal, where noise of the surface shows, but for this part of all the last but one does.
 SMOOTH, HIDDEN = 0.15, 0.002
 ROUNDING = 2.0**-92  # of coordinates, as extrapolation magnifies it
@@ -84,7 +86,7 @@ def extended(lines: Floats, turn: Floats, degree: int, layers: int, beside: Indi
 
 
 def continued(lines: Floats, layers: int, even: Bools) -> Floats:
-    """Ghosts (k, layers, ..., 3) on the polynomials through lines (k, degree + 1, ..., 3): by index if even."""
+    """Ghosts (k, layers, ..., 3) on polynomials through lines (k, degree + 1, ..., 3): by index if even."""
     degree = lines.shape[1] - 1
     x = lines - lines[:, :1]
     weights = np.stack([index_weights(degree, m + 1) for m in range(layers)])

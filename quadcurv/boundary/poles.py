@@ -61,7 +61,7 @@ def closed_grid(grid: QuadGrid, found: list[Pole]) -> tuple[Stencils, NDArray[np
 
 @np.errstate(all="ignore")
 def parts_at_poles(grid: QuadGrid) -> list[tuple[Indices, QuadGrid, Bools]]:
-    """Grids of the rows near each pole, their vertices in the whole grid, which of them are at or beside it."""
+    """Grids of the rows near each pole, their vertices in the whole, which of them are at or beside it."""
     number = np.arange(grid.shape[0] * grid.shape[1]).reshape(grid.shape)
     near = []
     for axis, end in poles(grid):

@@ -1,4 +1,4 @@
-"""The open sides of grids, without a face list: what is beyond them by index, and where that is not enough."""
+"""Open sides of grids, without a face list: what is beyond by index, and where that is not enough."""
 
 from __future__ import annotations
 

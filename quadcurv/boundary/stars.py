@@ -1,8 +1,8 @@
 """Rings at the border closed by points of a surface fitted at the vertex.
 
-The fan of faces is completed by its mirror image through the vertex, in the tangent plane: as the other side of
-a regular vertex looks. Where that leaves a wide gap, edges are put between; ghosts lie on the fitted surface. A
-fan that leaves no room is not used: four quads on the surface take its place.
+The fan of faces is completed by its mirror image through the vertex, in the tangent plane: as the other
+side of a regular vertex looks. Where that leaves a wide gap, edges are put between; ghosts lie on the
+fitted surface. A fan that leaves no room is not used: four quads on the surface take its place.
 """
 
 from __future__ import annotations
@@ -17,7 +17,8 @@ from quadcurv.types import Bools, Floats, Indices, Ints
 
 _NARROW = np.radians(10)  # a gap less than that leaves no room for a face
 _BENT = 0.1  # how far a ghost quad may be from a parallelogram, in sums of its edges
-# Which edges of so many quads, or triangles, have mirror images that make them the four, or six, of a lattice.
+# Which edges of so many quads, or triangles, have mirror images that make them the four, or six, of a
+# lattice.
 _QUADS = {1: (1, 1), 2: (0, 1, 0), 3: (0, 0, 0, 0)}
 _TRIANGLES = {1: (1, 1), 2: (1, 1, 1), 3: (0, 1, 1, 0), 4: (0, 0, 1, 0, 0), 5: (0, 0, 0, 0, 0, 0)}
 
@@ -47,7 +48,7 @@ class Fans(NamedTuple):
 
 
 class Stars(NamedTuple):
-    """Closed rings with points of their own: `faces` (m, 4) over `points`, the first n of them the centres."""
+    """Closed rings with points of their own: `faces` (m, 4) over `points`, the first n of these centres."""
 
     points: Floats
     faces: Ints
@@ -143,7 +144,7 @@ def _subdivided(x: Floats, between: Indices) -> Floats:
 
 def _star(stencils: Stencils, fan: Fans, surfaces: Surfaces, ghosts: Floats) -> Stars:
     """Faces of fans that all look alike, and of the ghosts (n, g, 2) that close them."""
-    n, k = fan.across.shape
+    k = fan.across.shape[1]
     edges, across = (surfaces.flat(stencils.points[x]) for x in (fan.edges, fan.across))
     quad = fan.across[0] >= 0
     as_quads = 2 * quad.sum() >= k
@@ -196,7 +197,7 @@ def _twists(
     unit = ring / length
     middle = unit[:, :-1] + unit[:, 1:]
     middle = np.arctan2(middle[..., 1], middle[..., 0]) - angle[:, :1]
-    twist, parity = np.zeros(middle.shape + (2,)), [0] * middle.shape[1]
+    twist, parity = np.zeros((*middle.shape, 2)), [0] * middle.shape[1]
     for turn, sign in ((np.pi / 2, -1), (-np.pi / 2, -1), (np.pi, 1)):
         at = (middle + turn) % (2 * np.pi)
         face = (at[..., None] >= fan[:, None, 1:]).sum(axis=2)
@@ -210,7 +211,7 @@ def _twists(
 
 
 def bent(twist: Floats, a: Floats, b: Floats) -> Floats:
-    """What a ghost quad with edges a and b has beyond a parallelogram: a rough mesh's own would be too much."""
+    """What a ghost quad of edges a, b has beyond a parallelogram: a rough mesh's own would be too much."""
     edges = np.linalg.norm(a, axis=-1) + np.linalg.norm(b, axis=-1)
     most = np.minimum(_BENT * edges, 2.5 * _BENT * np.linalg.norm(a + b, axis=-1))
     size = np.linalg.norm(twist, axis=-1)

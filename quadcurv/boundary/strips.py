@@ -1,9 +1,9 @@
 """Strips of quads inward from the border of a face list, and the quads of ghosts that continue them.
 
 The two sides of a strip run X_0, ..., X_5 straight through X_1, ..., X_4, which must be regular: four quads
-around, or two on the border; the sixth point may be missing for a quartic. At a corner, a border vertex of one
-quad, the ghosts of its two sides are extrapolated once more to the point across. A face list of a grid thus
-gets the ghosts of the grid.
+around, or two on the border; the sixth point may be missing for a quartic. At a corner, a border vertex of
+one quad, the ghosts of its two sides are extrapolated once more to the point across. A face list of a grid
+thus gets the ghosts of the grid.
 """
 
 from __future__ import annotations
@@ -16,7 +16,6 @@ from numpy.typing import NDArray
 from quadcurv.boundary.lines import NODES, continued, extended
 from quadcurv.stencils import Stencils, face_pairs
 from quadcurv.types import Bools, Floats, Indices
-
 
 _CORNER = 8.0  # what extrapolating once more makes of errors
 

@@ -230,7 +230,9 @@ class _FaceNeighbourhoods:
 
 
 class _Beyond(NamedTuple):
-    """Neighbourhoods that go on beyond the border, `reach` rings of faces, and the places of vertices in them."""
+    """Neighbourhoods that go on beyond the border, `reach` rings of faces, and the places of vertices in
+    them.
+    """
 
     faces: _FaceNeighbourhoods
     place: Indices
