@@ -131,7 +131,7 @@ def _treated(mesh: Mesh, boundary: str) -> tuple[Stencils, NDArray[np.uint8]]:
         mesh = mesh.to_mesh()
     found = poles(mesh) if isinstance(mesh, QuadGrid) else []
     given = mesh.stencils()
-    if found:
+    if isinstance(mesh, QuadGrid) and found:
         treated, treatment = closed_grid(mesh, found)
         if boundary == "nan":
             treatment = np.where(given.closed, treatment, OPEN).astype(np.uint8)

@@ -7,7 +7,7 @@ fitted surface. A fan that leaves no room is not used: four quads on the surface
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -44,7 +44,7 @@ class Fans(NamedTuple):
 
     def of(self, rows: Indices) -> Fans:
         """Some of them."""
-        return Fans(*(values[rows] for values in self))
+        return Fans._make(values[rows] for values in self)
 
 
 class Stars(NamedTuple):
@@ -168,7 +168,8 @@ def _star(stencils: Stencils, fan: Fans, surfaces: Surfaces, ghosts: Floats) -> 
     g = ghosts.shape[1]
     a = np.concatenate(([k + 1], first + np.arange(g), [1]))
     d = first + g + np.arange(g + 1)
-    faces, number, flap = [], iter(range(k + 2, first)), iter(range(first + 2 * g + 1, points.shape[1]))
+    faces: list[Any] = []
+    number, flap = iter(range(k + 2, first)), iter(range(first + 2 * g + 1, points.shape[1]))
     for i in range(k):
         if quad[i]:
             faces.append(np.roll((0, 1 + i, next(number), 2 + i), fan.slot[0, i]))

@@ -74,7 +74,7 @@ class Surfaces(NamedTuple):
 
     def of(self, rows: Indices) -> Surfaces:
         """Some of them."""
-        return Surfaces(*(values[rows] for values in self))
+        return Surfaces._make(values[rows] for values in self)
 
 
 def fitted(stencils: Stencils, vertices: Indices) -> Surfaces:
@@ -100,8 +100,8 @@ def fitted(stencils: Stencils, vertices: Indices) -> Surfaces:
     noise = np.where(np.isfinite(noise), np.sqrt(shared), np.inf)
     error = np.where(np.isfinite(noise), noise * gain, np.inf)
     best = np.arange(k), np.argmin(error, axis=1)
-    chosen = (values[best] for values in (maps, coefficients, error, noise, bend))
-    return Surfaces(stencils.points[vertices], frames, *chosen, around, ring)
+    chosen = [values[best] for values in (maps, coefficients, error, noise, bend)]
+    return Surfaces._make((stencils.points[vertices], frames, *chosen, around, ring))
 
 
 def _normals(stencils: Stencils, vertices: Indices, around: Ints, ring: Ints) -> Floats:

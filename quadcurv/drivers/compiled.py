@@ -113,7 +113,8 @@ def _evaluate_rows(
     r, c = grid.shape
     if isinstance(grid, QuadGrid):
         around, unserved = frame(grid, boundary)
-        kernel = partial(rows.grid_curvatures, flat(grid.points), 3 * c, *map(flat, around), liu, *wanted)
+        beyond, beside = map(flat, around)
+        kernel = partial(rows.grid_curvatures, flat(grid.points), 3 * c, beyond, beside, liu, *wanted)
     else:
         dual = grid.dual
         for axis in (0, 1):
@@ -128,9 +129,8 @@ def _evaluate_rows(
             points = points[size + 3 :]
         else:
             around, unserved = frame(grid, boundary)
-        kernel = partial(
-            cells.staggered_curvatures, points, size, *map(flat, around), flat(dual), liu, *wanted
-        )
+        beyond, beside = map(flat, around)
+        kernel = partial(cells.staggered_curvatures, points, size, beyond, beside, flat(dual), liu, *wanted)
     ranges.over(kernel, r, r * c, rows.LEAST_ROWS)
     return unserved
 
