@@ -17,6 +17,7 @@ from comparisons.claims import Judgement, judge, print_judgements
 from comparisons.figures import paper_style, save_figure
 from comparisons.maps import save_maps
 from comparisons.measured import Measured
+from quadcurv import viewing
 from quadcurv.tables import WIDTH, short, text_tables, write_csv
 
 OUTPUT = Path(__file__).parent / "output"
@@ -42,7 +43,7 @@ def progress(what: str) -> Iterator[None]:
 
 @paper_style
 def draw(script: ModuleType, found: Measured, output: Path, prefix: str = "") -> None:
-    """Make the ``FIGURES`` of a script, and its ``MAPS`` where it has any."""
+    """Make the ``FIGURES`` of a script, and its ``MAPS`` and ``PAGES`` where it has any."""
     figures: dict[str, Callable[[Measured], Figure]] = script.FIGURES
     with progress(f"{prefix}{len(figures)} figures"):
         for stem, make in figures.items():
@@ -53,6 +54,11 @@ def draw(script: ModuleType, found: Measured, output: Path, prefix: str = "") ->
         with progress(f"{prefix}{len(maps)} maps"):
             for stem, make in maps.items():
                 problem = save_maps(make(), output, stem) or problem
+    pages = getattr(script, "PAGES", {})
+    if pages:
+        with progress(f"{prefix}{len(pages)} pages"):
+            for stem, make in pages.items():
+                viewing.save_maps(make(), output / f"{stem}.html", "error")
     if problem:
         Console(stderr=True).print(f"Pages .html in place of pictures of the maps: {problem}")
 

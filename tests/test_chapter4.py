@@ -186,6 +186,14 @@ def test_one_colour_and_marker_a_scheme():
     assert len(set(looks)) == len(looks)
 
 
+def test_page_of_all_operators(tmp_path):
+    script = type(chapter4)("pages")
+    script.FIGURES, script.PAGES = {}, figures.PAGES
+    common.draw(script, Measured(), tmp_path)
+    page = (tmp_path / "pillow_error_maps.html").read_text(encoding="utf-8")
+    assert all(name in page for name in ("finite_volume", "bilinear", "cotan-8-voronoi"))
+
+
 def test_maps_of_four_schemes():
     maps = figures.MAPS["chapter4_pillow_map"]()
     assert len(maps.panels) == 4

@@ -8,9 +8,11 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from comparisons.chapter4.measure import schemes
 from comparisons.figures import COLOURS, LABELS, STYLES, figure, plot_errors
 from comparisons.maps import Maps
 from comparisons.measured import Measured, curvature_errors
+from quadcurv.comparison import Comparison, compare
 from quadcurv.surfaces import pillow_sphere
 
 ERROR = r"error of $\kappa = \|\mathbf{H}\|$ (1/length)"
@@ -126,3 +128,12 @@ def pillow_maps() -> Maps:
 
 
 MAPS = {"chapter4_pillow_map": pillow_maps}
+
+
+def pillow_comparison() -> Comparison:
+    """All operators on the pillow sphere."""
+    mesh, xi, eta = pillow_sphere().sample((96, 48), "staggered")
+    return compare(mesh, schemes().values(), pillow_sphere().mean_curvature(xi, eta))
+
+
+PAGES = {"pillow_error_maps": pillow_comparison}
