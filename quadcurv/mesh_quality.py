@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from quadcurv import drivers
-from quadcurv.boundary import EXTRAPOLATED, INTERIOR, OPEN, boundary_treatment, roughness
+from quadcurv.boundary import EXTRAPOLATED, FITTED, INTERIOR, OPEN, boundary_treatment, roughness
 from quadcurv.io import as_mesh
 from quadcurv.mesh import Mesh
 from quadcurv.schemes import SCHEMES, Fit, Scheme, as_scheme
@@ -118,8 +118,12 @@ def summary(mesh: Any, schemes: Iterable[str] | None = None, boundary: str = "ex
         "coincident": stencils.n - len(np.unique(stencils.points[: stencils.n] + 0.0, axis=0)),
         "valence": {k: int(count) for k, count in enumerate(np.bincount(stencils.valence)) if count},
         "boundary": {
-            name: int(np.count_nonzero(treatment == code))
-            for name, code in (("interior", INTERIOR), ("extrapolated", EXTRAPOLATED), ("open", OPEN))
+            name: int(np.count_nonzero(np.isin(treatment, codes)))
+            for name, codes in (
+                ("interior", INTERIOR),
+                ("extrapolated", (EXTRAPOLATED, FITTED)),
+                ("open", OPEN),
+            )
         },
         "undefined": {
             name: int(np.count_nonzero(np.isnan(_mean_curvature(mesh, as_scheme(name), boundary)[present])))

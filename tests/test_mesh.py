@@ -196,7 +196,6 @@ def test_with_points_keeps_the_faces():
             lambda: StaggeredGrid.from_mapping(surfaces.plane().mapping, [0, 1, 2], np.arange(5)),
             r"xi: shape \(3,\), expected \(cells \+ 3,\)",
         ),
-        (lambda: one_rings(QuadGrid(np.zeros((4, 9, 3)))), "4 rows, but extrapolation .* needs at least 5"),
     ],
 )
 def test_what_grids_reject(make, match):
