@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import operator
 from collections.abc import Iterable, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from quadcurv.ragged import Faces
 from quadcurv.stencils import Polygons
 from quadcurv.types import Bools, Floats, Indices, Ints, MeshError
 
@@ -233,7 +233,7 @@ def checked_faces(faces: Any, n: int) -> GivenFaces:
     if np.ma.is_masked(faces):
         raise MeshError("faces: masked entries, expected an index in each")
     try:
-        given = np.asarray(faces)
+        given = np.empty(0, object) if isinstance(faces, Faces) else np.asarray(faces)
     except ValueError:  # polygons of different lengths
         given = np.empty(0, object)
     if given.ndim == 2 and given.shape[1] in (3, 4):
@@ -275,47 +275,56 @@ def _from_table(table: Any, n: int, checked: Any) -> GivenFaces:
 
 def _from_polygons(faces: Any, n: int) -> GivenFaces:
     try:
-        polygons = [[operator.index(v) for v in face] for face in faces]
+        given = Faces.of(faces)
     except TypeError:
         raise MeshError(
             "faces: expected an integer array of shape (m, 3) or (m, 4), or a sequence of polygons"
         ) from None
-    rows: list[list[int]] = []
-    source: list[int] = []
-    large: list[list[int]] = []
-    large_source: list[int] = []
-    collapsed, dropped = [], np.zeros(len(polygons), bool)
-    for i, polygon in enumerate(polygons):
-        if len(polygon) == 4 and polygon[3] == -1:
-            polygon = polygon[:3]
-        if len(polygon) < 3:
-            raise MeshError(f"faces: a face has at least 3 vertices, face {i} has {len(polygon)}")
-        if min(polygon) < 0 or max(polygon) >= n:
-            raise MeshError(f"faces: face {i} has an index outside 0..{n - 1}: {polygon}")
-        if len(set(polygon)) < len(polygon):
-            face = without_repetition(list(polygon))
-            if len(face) < 3:
-                dropped[i] = True
-                continue
-            if len(face) < len(polygon):
-                collapsed.append(i)
-            polygon = face
-        if len(polygon) > 4:
-            large.append(polygon)
-            large_source.append(i)
-        else:
-            rows.append([*polygon, -1][:4])
-            source.append(i)
-    indptr = np.concatenate(([0], np.cumsum([len(p) for p in large], dtype=np.int64)))
-    corners = np.array([v for p in large for v in p], np.int32)
+    given = _without_marks(given)
+    if (short := given.sizes < 3).any():
+        i = int(np.argmax(short))
+        raise MeshError(f"faces: a face has at least 3 vertices, face {i} has {given.sizes[i]}")
+    if (outside := (given.corners < 0) | (given.corners >= n)).any():
+        i = int(np.searchsorted(given.ends, np.argmax(outside), side="right"))
+        raise MeshError(f"faces: face {i} has an index outside 0..{n - 1}: {given[i]}")
+    source, collapsed, dropped = np.arange(len(given)), list[int](), np.zeros(len(given), bool)
+    if (repeated := given.repeating()).any():
+        mended = {i: without_repetition(given[i]) for i in np.flatnonzero(repeated).tolist()}
+        dropped[[i for i, face in mended.items() if len(face) < 3]] = True
+        collapsed = [i for i, face in mended.items() if 3 <= len(face) < given.sizes[i]]
+        rest = np.flatnonzero(~repeated)
+        kept = [i for i in mended if not dropped[i]]
+        other = Faces.of([mended[i] for i in kept])
+        whole = given.chosen(rest)
+        both = Faces(np.append(whole.sizes, other.sizes), np.append(whole.corners, other.corners))
+        source = np.append(rest, np.array(kept, np.int64))
+        order = np.argsort(source)
+        given, source = both.chosen(order), source[order]
+    large = np.flatnonzero(given.sizes > 4)
+    small = given.chosen(np.flatnonzero(given.sizes <= 4))
+    table = np.full((len(small), 4), -1, np.int32)
+    table[np.arange(4) < small.sizes[:, None]] = small.corners
+    polygons = given.chosen(large)
+    indptr, corners = np.append(0, polygons.ends), polygons.corners.astype(np.int32)
     return GivenFaces(
-        np.array(rows, np.int32).reshape(-1, 4),
-        np.array(source, np.int64),
-        Polygons(indptr, corners, np.empty(0, np.int64)) if large else None,
-        np.array(large_source, np.int64),
+        table,
+        source[given.sizes <= 4],
+        Polygons(indptr, corners, np.empty(0, np.int64)) if large.size else None,
+        source[large],
         _mended(np.array(collapsed, np.int64), dropped)
-        + ([Finding("cut", len(large), f"face {large_source[0]}")] if large else []),
+        + ([Finding("cut", large.size, f"face {source[large[0]]}")] if large.size else []),
     )
+
+
+def _without_marks(faces: Faces) -> Faces:
+    """Faces whose fourth entry is the mark -1 of a triangle, without it."""
+    marked = np.flatnonzero(faces.sizes == 4)
+    marked = marked[faces.corners[faces.ends[marked] - 1] == -1]
+    if not marked.size:
+        return faces
+    sizes = faces.sizes.copy()
+    sizes[marked] = 3
+    return Faces(sizes, np.delete(faces.corners, faces.ends[marked] - 1))
 
 
 def without_repetition(face: list[int]) -> list[int]:

@@ -26,6 +26,7 @@ from quadcurv import (
 )
 from quadcurv.io.base import polygons
 from quadcurv.io.ply import read_ply
+from quadcurv.ragged import Faces
 
 SINGLE = np.finfo(np.float32).eps
 # Two quads and two triangles of irrational positions, the faces' kinds mixed.
@@ -379,7 +380,7 @@ def test_damaged_ply_files_never_crash(tmp_path_factory, data, text):
     except MeshError:
         return
     assert content.points.shape[1:] == (3,)
-    assert isinstance(content.faces, list) or content.faces.shape[1:] == (4,)
+    assert isinstance(content.faces, Faces) or content.faces.shape[1:] == (4,)
 
 
 def test_polygons_as_table_or_list():

@@ -17,7 +17,7 @@ HEAVY = {"trimesh", "pymeshlab", "pyvista", "igl", "matplotlib", "vtk", "vtkmodu
 # Rooms (a module or a package) from the lowest floor up: a room imports from lower floors, or within itself.
 FLOORS = [
     ["extras", "html", "types"],
-    ["kernels"],
+    ["kernels", "ragged"],
     ["coincidence", "polygons", "stencils"],
     ["checks"],
     ["connectivity"],

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 import os
 import sys
 import warnings
@@ -15,11 +14,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from quadcurv.mesh import QuadMesh
+from quadcurv.ragged import Faces
 from quadcurv.types import Bools, Indices, Ints, MeshError, MeshWarning
 
 SAME_PLACE = 1e-6  # of the extent of a mesh: single precision is what many files have
 
-Polygons = NDArray[np.int64] | list[list[int]]
+Polygons = NDArray[np.int64] | Faces
 Values = Mapping[str, NDArray[Any]]
 
 
@@ -121,7 +121,7 @@ def polygons(sizes: Sequence[int] | NDArray[Any], vertices: Sequence[int] | NDAr
 
     Returns
     -------
-    (m, 4) int64 or list of list of int
+    (m, 4) int64 or Faces
         A table, -1 after the corners of a triangle, where all faces are triangles and quads.
 
     Raises
@@ -144,8 +144,7 @@ def polygons(sizes: Sequence[int] | NDArray[Any], vertices: Sequence[int] | NDAr
         table = np.full((len(sizes), 4), -1, np.int64)
         table[np.arange(4) < sizes[:, None]] = vertices
         return table
-    flat, cuts = vertices.tolist(), [0, *ends.tolist()]
-    return [flat[begin:end] for begin, end in itertools.pairwise(cuts)]
+    return Faces(sizes, vertices)
 
 
 def joined(parts: Sequence[Content]) -> Content:

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from quadcurv.coincidence import first_at_place
 from quadcurv.io.base import FORMATS, Content, polygons
 from quadcurv.io.text import runs
+from quadcurv.ragged import Faces
 from quadcurv.types import Indices, MeshError
 
 SUFFIXES = (".obj", ".off", ".ply")  # formats of polygons that trimesh cuts
@@ -81,8 +82,8 @@ def _corners(faces: Any) -> tuple[Indices, Indices]:
     if isinstance(faces, np.ndarray):
         table = faces.astype(np.int64)
         return (table >= 0).sum(axis=1), table[table >= 0]
-    flat = [np.asarray(face, np.int64) for face in faces]
-    return np.array([len(face) for face in flat], np.int64), np.concatenate([*flat, np.empty(0, np.int64)])
+    ragged = Faces.of(faces)
+    return ragged.sizes, ragged.corners
 
 
 def _from_least(triangles: NDArray[np.int64]) -> NDArray[np.int64]:
