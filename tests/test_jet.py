@@ -325,7 +325,7 @@ def test_smooth_borders_of_lower_degrees(degree, rings, bound, mean_curvature, r
         everywhere.append(error.max())
         inside.append(inner(error, grid.wrap).max())
     assert (np.array(everywhere) < 6 * np.array(inside)).all()
-    assert fitted_rate((32, 64, 128), everywhere) > 1.8
+    assert fitted_rate((32, 64, 128), everywhere) > 1.0  # beside a border closed by length
     assert everywhere[-1] < 3 * bound
 
 

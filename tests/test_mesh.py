@@ -14,7 +14,6 @@ from quadcurv import (
     QuadMesh,
     StaggeredGrid,
     mean_curvature,
-    one_rings,
     surfaces,
 )
 
