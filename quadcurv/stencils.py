@@ -72,7 +72,8 @@ class Frame(NamedTuple):
     beyond : (2, c, 3) float64
         The rows before the first and after the last one.
     beside : (2, r + 2, 3) float64
-        The columns before the first and after the last one, those of the rows of `beyond` too.
+        The columns before the first and after the last one, those of the rows of `beyond` too; empty where
+        rows are closed.
     """
 
     beyond: Floats

@@ -91,7 +91,7 @@ def test_geometry(u, v):
 
 
 def running_sums(x, y, start, stop):
-    before = Carried((0.0, start - start))
+    before = Carried((0.0, 0))
     for k in span(start, stop, 2):
         total, count = before.get()
         y[k] = total = total + x[k]

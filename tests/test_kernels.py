@@ -189,6 +189,34 @@ def test_reciprocal_roots_are_right_to_the_last_digit_or_two():
 
 
 @pytest.mark.parametrize("scheme", DIRECT)
+def test_whether_squares_are_looked_at_one_by_one_changes_nothing(scheme, monkeypatch):
+    """They are where some are as small as rounding could make them, by the farthest point seen so far.
+
+    A single far point has all rows after it looked at, in the range of rows that it is in; a quad without
+    area the stretch of 64 columns that it is in.
+    """
+    points = rough((120, 150))
+    far = points.copy()
+    far[20, 140] = 1e9
+    without_area = points.copy()
+    without_area[50, 70:72] = without_area[51, 70:72] = points[50, 70]
+    for changed in (far, without_area, points + 1e9):
+        grid = QuadGrid(changed)
+        whole = qc.evaluate(grid, *NAMES, scheme=scheme, boundary="nan")
+        if changed is not far:  # what is known of the far point's own ring depends on what is looked at
+            same(grid, scheme, "nan")
+        assert np.isfinite(whole["mean_curvature"]).sum() > 0.9 * 118 * 148
+        with monkeypatch.context() as patch:
+            patch.setattr(ranges, "SERIAL_BELOW", 0)
+            patch.setattr(rows, "LEAST_ROWS", 1)
+            qc.set_threads(3)
+            cut = qc.evaluate(grid, *NAMES, scheme=scheme, boundary="nan")
+            qc.set_threads(None)
+        for name in NAMES:
+            np.testing.assert_array_equal(cut[name], whole[name])
+
+
+@pytest.mark.parametrize("scheme", DIRECT)
 @pytest.mark.parametrize("size", [1e-70, 1e-30, 1e30, 1e68])
 def test_sizes_far_from_one(scheme, size):
     """The square of u x v is that of an area: the fourth power of a length."""

@@ -62,9 +62,12 @@ def closed_grid(grid: QuadGrid, found: list[Pole]) -> tuple[Stencils, NDArray[np
 @np.errstate(all="ignore")
 def parts_at_poles(grid: QuadGrid) -> list[tuple[Indices, QuadGrid, Bools]]:
     """Grids of the rows near each pole, their vertices in the whole, which of them are at or beside it."""
+    near: list[tuple[Indices, QuadGrid, Bools]] = []
+    found = poles(grid)
+    if not found:
+        return near
     number = np.arange(grid.shape[0] * grid.shape[1]).reshape(grid.shape)
-    near = []
-    for axis, end in poles(grid):
+    for axis, end in found:
         size = min(REACH + 3, grid.shape[axis])
         rows = slice(0, size) if end == 0 else slice(grid.shape[axis] - size, None)
         cut = (rows, slice(None)) if axis == 0 else (slice(None), rows)

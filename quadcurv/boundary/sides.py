@@ -81,11 +81,9 @@ def frame(grid: QuadGrid | StaggeredGrid, boundary: str) -> tuple[Frame, Indices
     """Ghosts by index around a grid, NaN where nothing is known; border vertices that they do not serve."""
     points = grid.points if isinstance(grid, QuadGrid) else grid.primal
     (r, c, _), wrap = points.shape, grid.wrap
-    beyond, beside = np.full((2, c, 3), np.nan), np.full((2, r + 2, 3), np.nan)
+    beyond, beside = np.full((2, c, 3), np.nan), np.full((2, 0 if wrap[1] else r + 2, 3), np.nan)
     if wrap[0]:
         beyond[:] = points[[-1, 0]]
-    if wrap[1]:
-        beside[:, 1:-1] = points[:, -1], points[:, 0]
     bad = None
     for axis, outside in enumerate((beyond, beside[:, 1:-1])):
         if wrap[axis] or boundary == "nan":
@@ -95,11 +93,9 @@ def frame(grid: QuadGrid | StaggeredGrid, boundary: str) -> tuple[Frame, Indices
             if even is not None:
                 bad = np.zeros((r, c), bool) if bad is None else bad
                 np.moveaxis(bad, axis, 0)[-end] |= _unserved(even, wrap[1 - axis])
-    for end in (0, 1):
+    for end in () if wrap[1] else (0, 1):
         line = beyond[:, :: 1 - 2 * end]
-        beside[end, [0, -1]] = (
-            beside[end, [-2, 1]] if wrap[0] else line[:, -1] if wrap[1] else _at_corner(line)
-        )
+        beside[end, [0, -1]] = beside[end, [-2, 1]] if wrap[0] else _at_corner(line)
     return Frame(beyond, beside), np.empty(0, np.int64) if bad is None else np.flatnonzero(bad)
 
 

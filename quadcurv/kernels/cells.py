@@ -162,8 +162,8 @@ def _pass(points, size, beyond, beside, dual, liu, Hn, H, normal, area, start, s
             inside = 0 <= i < rows
             first = size * i if inside else 0 if i < 0 else 3 * c
             to, width, row = q + FIRST, end - begin, i + 1
-            load_row(planes, to, points, beyond, inside, first + 3 * begin, width)
-            load_ends(planes, to, points, beyond, beside, inside, first, begin, end, c, row, rows)
+            load_row(planes, to, points, beyond, inside, first + 3 * begin, width, 0)
+            load_ends(planes, to, points, beyond, beside, inside, first, begin, end, c, row, rows, 0)
             if i >= start:
                 load_dual(planes, b + FIRST, dual, 3 * ((c + 1) * i + begin), width + 1)
             if i == start:

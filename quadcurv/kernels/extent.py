@@ -12,7 +12,7 @@ _MAGNITUDE = 2**63 - 1  # all bits but that of the sign
 @formula
 def largest_bits(values, start, stop):
     """Largest of the bits of magnitudes: those of NaN and of infinity are larger than all others."""
-    most = Carried((start - start,))
+    most = Carried((0,))
     for k in span(start, stop, 4):
         magnitude, (before,) = bits(values[k]) & _MAGNITUDE, most.get()
         most.set((where(magnitude > before, magnitude, before),))

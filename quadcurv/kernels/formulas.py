@@ -311,7 +311,7 @@ class Carried:
     def __init__(self, values):
         self._values = values
         if _desk.drafts:
-            self._kinds = [type(x) if isinstance(x, _Value) else Real for x in values]
+            self._kinds = [next(kind for kind in (Whole, Real) if kind.of(x) is not None) for x in values]
             self._places = [
                 cgutils.alloca_once_value(_desk.drafts[-1].builder, kind.of(x))
                 for kind, x in zip(self._kinds, values, strict=True)
@@ -366,6 +366,15 @@ def bits(x):
         Whole(_desk.drafts[-1].builder.bitcast(x.value, _INT))
         if isinstance(x, Real)
         else np.float64(x).view(int)
+    )
+
+
+def from_bits(x):
+    """The float of these bits."""
+    return (
+        Real(_desk.drafts[-1].builder.bitcast(x.value, _DOUBLE))
+        if isinstance(x, Whole)
+        else np.int64(x).view(float)
     )
 
 

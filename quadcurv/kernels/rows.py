@@ -11,9 +11,23 @@ same place of another page waits for it; so placed, loads keep ahead of stores.)
 import numpy as np
 
 from quadcurv.kernels.compiled import kernel
-from quadcurv.kernels.formulas import Carried, formula, prefetch, span, where
+from quadcurv.kernels.formulas import Carried, bits, formula, from_bits, prefetch, span, where
 from quadcurv.kernels.quad import fluxes, quads_area, quads_scale, ring_area, ring_scale
-from quadcurv.kernels.vector import apart, cross, dot, known_square, less, place, plus, times, triple, unit
+from quadcurv.kernels.vector import (
+    apart,
+    cross,
+    dot,
+    known_square,
+    larger,
+    less,
+    most_rounding,
+    place,
+    plus,
+    smaller,
+    times,
+    triple,
+    unit,
+)
 
 WIDTH = 2048  # columns done at once: their rows stay in the second-level cache
 STRETCH = 64  # of them, by one loop after the other: what these leave stays in the first-level cache
@@ -22,6 +36,7 @@ PAGE = 512  # doubles
 Y = WIDTH + PAGE // 2  # between planes of a row
 ROW = 3 * Y  # between rows
 S = STRETCH + 8  # between planes of a stretch
+MOST = 2**63 - 1  # of bits
 FIRST = 8  # place of the first vertex in a plane, its left neighbour before it
 # In `work`: normals of quads, their squares, lengths, diagonals; normals of rings, their squares and scales;
 # what sums of fluxes are multiplied by; what dual areas come from.
@@ -43,15 +58,22 @@ def rooms(sizes):
 
 
 @formula
-def load_row(planes, to, points, beyond, inside, at, width):
-    """Put a row that begins at number `at` of the points, or of those beyond them, into planes."""
+def load_row(planes, to, points, beyond, inside, at, width, far):
+    """Put a row that begins at number `at` of the points, or of those beyond them, into planes.
+
+    Returns the bits of the largest square of any point's coordinates so far.
+    """
     points = where(inside, points, beyond)
+    most = Carried((far,))
     for k in span(0, width):
-        place(planes, to + k, Y, triple(points, at + 3 * k, 1))
+        point = triple(points, at + 3 * k, 1)
+        place(planes, to + k, Y, point)
+        most.set((larger(most.get()[0], bits(dot(point, point))),))
+    return most.get()[0]
 
 
 @formula
-def load_ends(planes, to, points, beyond, beside, inside, first, begin, end, columns, row, rows):
+def load_ends(planes, to, points, beyond, beside, inside, first, begin, end, columns, row, rows, far):
     """Put the points before and after columns begin..end of a row, which begins at `first`, into planes.
 
     Where rows end they are those of `beside` at place `row`, or of a closed row the last and the first point.
@@ -63,19 +85,21 @@ def load_ends(planes, to, points, beyond, beside, inside, first, begin, end, col
         (to + (end - begin), end < columns, 3 * end, 0, rows + 2 + row),
     ):
         source = where(within | closed, points, beside)
-        place(
-            planes,
-            at,
-            Y,
-            triple(
-                source, where(within | closed, first + where(within, next_to, other), 3 * place_beside), 1
-            ),
-        )
+        place_there = where(within | closed, first + where(within, next_to, other), 3 * place_beside)
+        point = triple(source, place_there, 1)
+        place(planes, at, Y, point)
+        far = larger(far, bits(dot(point, point)))
+    return far
 
 
 def diagonals(planes, p, q, i):
     """Of the quad whose first two vertices are at i in rows p and q, the others beside them."""
     return apart(planes, q + i + 1, planes, p + i, Y), apart(planes, p + i + 1, planes, q + i, Y)
+
+
+def ring_diagonals(planes, o, p, q, i):
+    """Of the ring polygon around the vertex at i in row p."""
+    return apart(planes, q + i, planes, o + i, Y), apart(planes, p + i + 1, planes, p + i - 1, Y)
 
 
 @formula
@@ -96,40 +120,64 @@ def last_quad(work):
 
 
 def normals(planes, o, p, q, work, g, ring):
-    """Diagonals and normals of quads; with `ring` squares of the rings' normals, with 2 these too."""
+    """Diagonals and normals of quads; with `ring` squares of the rings' normals, with 2 these too.
+
+    Returns the bits of the least square.
+    """
+    least = Carried((MOST,))
     for k in span(0, STRETCH, 2):
         i, j = FIRST + g + k, FIRST + k
         u, v = diagonals(planes, p, q, i)
         place(work, j + U, S, u)
         place(work, j + V, S, v)
-        n, point = cross(u, v), triple(planes, p + i, Y)
+        n = cross(u, v)
         place(work, j + NORMAL, S, n)
-        work[j + QUAD_SQUARE] = known_square(n, u, v, point)
+        work[j + QUAD_SQUARE] = square = dot(n, n)
+        found = bits(square)
         if ring:
-            a = apart(planes, q + i, planes, o + i, Y)
-            b = apart(planes, p + i + 1, planes, p + i - 1, Y)
-            n = cross(a, b)
-            work[j + SQUARE] = known_square(n, a, b, point)
+            n = cross(*ring_diagonals(planes, o, p, q, i))
+            work[j + SQUARE] = square = dot(n, n)
+            found = smaller(found, bits(square))
             if ring == 2:
                 place(work, j + RING, S, n)
+        least.set((smaller(least.get()[0], found),))
+    return least.get()[0]
 
 
 @formula
 def quad_normals(planes, p, q, work, g):
     """As `normals`, of no rings."""
-    normals(planes, None, p, q, work, g, 0)
+    return normals(planes, None, p, q, work, g, 0)
 
 
 @formula
 def quad_normals_ring_squares(planes, o, p, q, work, g):
     """As `normals`, without those of rings."""
-    normals(planes, o, p, q, work, g, 1)
+    return normals(planes, o, p, q, work, g, 1)
 
 
 @formula
 def quad_and_ring_normals(planes, o, p, q, work, g):
     """As `normals`."""
-    normals(planes, o, p, q, work, g, 2)
+    return normals(planes, o, p, q, work, g, 2)
+
+
+@formula
+def is_clear(least, far):
+    """Whether all squares are larger than what rounding could make of zero, be it the most that there is."""
+    return from_bits(least) > most_rounding(from_bits(far))
+
+
+@formula
+def known_squares(planes, o, p, q, work, g, rings):
+    """Make squares zero that are but for rounding, those of the rings too if they are there."""
+    for k in span(0, STRETCH, 1):
+        i, j = FIRST + g + k, FIRST + k
+        point = triple(planes, p + i, Y)
+        normal, u, v = (triple(work, j + plane, S) for plane in (NORMAL, U, V))
+        work[j + QUAD_SQUARE] = known_square(normal, u, v, point)
+        a, b = ring_diagonals(planes, o, p, q, i)
+        work[j + SQUARE] = where(rings, known_square(cross(a, b), a, b, point), work[j + SQUARE])
 
 
 @formula
@@ -246,7 +294,7 @@ def _pass(points, size, beyond, beside, liu, Hn, H, normal, area, start, stop, p
     scale = RING_SCALE if liu else SCALE
     for begin in range(0, c, WIDTH):
         end = min(begin + WIDTH, c)
-        o, p, q, fresh = 0, ROW, 2 * ROW, 3 * ROW
+        o, p, q, fresh, far = 0, ROW, 2 * ROW, 3 * ROW, 0
         for i in range(start - 3, stop):
             ahead, wanted = min(i + 2, stop), i >= start  # the row that is loaded; whether there are results
             inside = 0 <= ahead < rows
@@ -269,18 +317,22 @@ def _pass(points, size, beyond, beside, liu, Hn, H, normal, area, start, stop, p
                         ask_to_write(normal, 3 * (at + width))
                     if areas:
                         ask_to_write(area, at + width)
-                    if not wanted or (liu and not (numbers or normals)):
-                        quad_normals(planes, p, q, work, g)
+                    rings = wanted and not (liu and not (numbers or normals))
+                    if not rings:
+                        least = quad_normals(planes, p, q, work, g)
                     elif numbers or normals:
-                        quad_and_ring_normals(planes, o, p, q, work, g)
+                        least = quad_and_ring_normals(planes, o, p, q, work, g)
                     else:
-                        quad_normals_ring_squares(planes, o, p, q, work, g)
+                        least = quad_normals_ring_squares(planes, o, p, q, work, g)
+                    if not is_clear(least, far):
+                        known_squares(planes, o, p, q, work, g, rings)
                     ask(points, first + 3 * right + STRETCH)
                     if vectors:
                         ask_to_write(Hn, 3 * (at + width) + STRETCH)
                     if normals:
                         ask_to_write(normal, 3 * (at + width) + STRETCH)
-                load_row(planes, fresh + FIRST + g, points, beyond, inside, first + 3 * left, width)
+                to = fresh + FIRST
+                far = load_row(planes, to + g, points, beyond, inside, first + 3 * left, width, far)
                 if not computed:
                     continue
                 if liu:
@@ -306,7 +358,7 @@ def _pass(points, size, beyond, beside, liu, Hn, H, normal, area, start, stop, p
                 if wanted and areas:
                     dual_areas(work, liu, area, at, width)
             to, row = fresh + FIRST, ahead + 1
-            load_ends(planes, to, points, beyond, beside, inside, first, begin, end, c, row, rows)
+            far = load_ends(planes, to, points, beyond, beside, inside, first, begin, end, c, row, rows, far)
             o, p, q, fresh = p, q, fresh, o
 
 

@@ -10,20 +10,11 @@ import numpy as np
 from quadcurv.kernels import ranges
 from quadcurv.kernels.compiled import flat, kernel
 from quadcurv.kernels.formulas import formula, prefetch, where
+from quadcurv.kernels.vector import larger, smaller
 
 ISOLATED, INTERIOR, BOUNDARY, SEVERAL_FANS, NONMANIFOLD = 0, 1, 2, 3, 4
 FAR = 10_000  # vertices between neighbours in memory, on average, that are in no cache
 AHEAD = 16  # faces or vertices: where what is read next lies far apart, it is asked for that early
-
-
-def smaller(a, b):
-    """The smaller one."""
-    return where(a < b, a, b)
-
-
-def larger(a, b):
-    """The larger one."""
-    return where(a < b, b, a)
 
 
 @formula

@@ -23,6 +23,16 @@ def place(x, i, plane, a):
     x[i], x[i + plane], x[i + 2 * plane] = a
 
 
+def smaller(a, b):
+    """The smaller one of two numbers."""
+    return where(b < a, b, a)
+
+
+def larger(a, b):
+    """The larger one of two numbers."""
+    return where(b > a, b, a)
+
+
 def less(a, b):
     """A triple less another."""
     return a[0] - b[0], a[1] - b[1], a[2] - b[2]
@@ -72,6 +82,14 @@ def rounding(edges, far):
     `edges` is the sum of the squares of the factors, `far` that of the coordinates of a point beside them.
     """
     return ROUNDING * edges * (edges + far)
+
+
+def most_rounding(far):
+    """`rounding` of whatever factors and points, `far` being the largest square of any point's coordinates.
+
+    A difference of two points has at most four times it, two of these at most eight.
+    """
+    return rounding(8.1 * far, far)
 
 
 def known_square(n, u, v, point):
