@@ -12,23 +12,17 @@ LANES fits go through every step together, the innermost loops running over them
 lies in rows of LANES numbers.
 """
 
-from functools import partial
 from math import inf, nan
 
 import numpy as np
 
-from quadcurv.kernels.compiled import flat, helper, kernel
-from quadcurv.kernels.formulas import formula, real, root, span, where
-from quadcurv.kernels.vector import cross, less, triple
+from quadcurv.kernels.compiled import flat, kernel
+from quadcurv.kernels.formulas import real, root, span, where
+from quadcurv.kernels.gather import BLOCKS, LANES, neighbourhoods, step, windows
+from quadcurv.kernels.vector import triple
 
-LANES = 48
-CROWDED = 64  # faces of a vertex, of which others are passed over from twice as many on
-BLOCKS = 8  # of LANES fits, whose neighbourhoods are gathered at once
 # Below this part of a term's square nothing is left but rounding.
 PIVOT = 1e-9
-# Steepest that a neighbourhood of more than one ring may be. A polynomial follows no steeper one (a sphere is
-# vertical where its powers stop converging), and what folds over is no graph at all.
-SLOPE = 2.0
 # Columns of a result.
 MEAN, GAUSSIAN, K1, K2 = 0, 1, 2, 3
 DIRECTION1, DIRECTION2, NORMAL = slice(4, 7), slice(7, 10), slice(10, 13)
@@ -36,9 +30,6 @@ SIGMA, ERROR, CONDITION, COLUMNS = 13, 14, 18, 19  # ERROR: four of them
 # Seen from the other side: H -> -H, k1 -> -k2.
 TURNED = np.array([0, 1, 3, 2, 7, 8, 9, 4, 5, 6, 10, 11, 12, 13, 14, 15, 17, 16, 18])
 SIGNS = np.array([-1.0, 1, -1, -1, 1, 1, 1, 1, 1, 1, -1, -1, -1, 1, 1, 1, 1, 1, 1])
-
-# Nothing but fused multiply-adds is left to the compiler: NaN stays NaN.
-step = partial(formula, contract=True)
 
 # Rows of `lane`: the axes of the frame; sums of x^2, x y, y^2, z^2 and of weights; the affine map
 # x = xx x', y = yx x' + yy y'; what of a term's square the terms before it left, at least; an inverse.
@@ -77,56 +68,6 @@ def workspace(degree):
     rows = (19, top + 1, top + 1, len(moments), len(with_z), (T + 1) * T)
     scratch = (np.zeros(count * LANES) for count in rows)
     return *scratch, flat(products, np.int32), flat(entries, np.int32)
-
-
-def is_turned(a, n):
-    """Whether a normal, of any length, is further than SLOPE from another one, n; not if it is NaN."""
-    up, size = a[0] * n[0] + a[1] * n[1] + a[2] * n[2], n[0] * n[0] + n[1] * n[1] + n[2] * n[2]
-    share = (1.0 + SLOPE * SLOPE) * up / size * where(up < 0, -up, up)
-    return share < a[0] * a[0] + a[1] * a[1] + a[2] * a[2]
-
-
-@step()
-def turned(normals, v, c):
-    """`is_turned` of vertices."""
-    return is_turned(triple(normals, 3 * v, 1), triple(normals, 3 * c, 1))
-
-
-@step()
-def add_point(points, v, c, P, m, lane):
-    """Put a point less a centre, or nothing where it is NaN, into row m of a neighbourhood."""
-    x, y, z = less(triple(points, 3 * v, 1), triple(points, 3 * c, 1))
-    known = x == x
-    for k, value in enumerate((x, y, z, 1.0)):
-        P[(4 * m + k) * LANES + lane] = where(known, value, 0.0)
-
-
-@step()
-def no_point(P, m, lane):
-    """Put nothing into row m of a neighbourhood."""
-    for k in range(4):
-        P[(4 * m + k) * LANES + lane] = 0.0
-
-
-def column(P, m, lane):
-    """Row m of a neighbourhood."""
-    return triple(P, 4 * m * LANES + lane, LANES)
-
-
-@step()
-def window_normal(P, middle, width, axes, block, lane):
-    """The normal across the ring of edge neighbours; missing ones are at the centre."""
-    a = less(column(P, middle + width, lane), column(P, middle - width, lane))
-    b = less(column(P, middle + 1, lane), column(P, middle - 1, lane))
-    for k, x in enumerate(cross(a, b)):
-        axes[(3 * block + k) * LANES + lane] = x
-
-
-@step()
-def vertex_normal(normals, c, axes, block, lane):
-    """The normal as given."""
-    for k, x in enumerate(triple(normals, 3 * c, 1)):
-        axes[(3 * block + k) * LANES + lane] = x
 
 
 @step()
@@ -393,24 +334,6 @@ def _fit(P, counts, normals, degree, out, size, lane, px, py, mu, nu, A, product
                 unknown(out, block * LANES + k, inf)
 
 
-@kernel
-def _windows(points, normals, columns, vertices, rings, P, counts, axes, steep):
-    width, total = 2 * rings + 1, vertices.size // 2
-    for k in range(counts.size * LANES):
-        block, lane, at = k // LANES, k % LANES, min(k, total - 1)
-        first, middle = block * width * width, block * width * width + (width * width - 1) // 2
-        c = vertices[2 * at] * columns + vertices[2 * at + 1]
-        counts[block] = width * width
-        found = False
-        for m in range(width * width):
-            v = c + (m // width - rings) * columns + m % width - rings
-            add_point(points, v, c, P, first + m, lane)
-            if rings > 1:
-                found |= turned(normals, v, c)
-        steep[k] = found
-        window_normal(P, middle, width, axes, block, lane)
-
-
 def grid_fits(points, normals, vertices, degree, rings, out):
     """Fit a grid's vertices over windows of 2 rings + 1 points in both directions.
 
@@ -435,63 +358,9 @@ def grid_fits(points, normals, vertices, degree, rings, out):
     for start in range(0, len(vertices), BLOCKS * LANES):
         some, results = flat(vertices[start : start + BLOCKS * LANES]), out[start : start + BLOCKS * LANES]
         counts = np.empty(-(-len(results) // LANES), np.int64)
-        _windows(points, normals, columns, some, rings, P, counts, axes, steep)
+        windows(points, normals, columns, some, rings, P, counts, axes, steep)
         _fit(P, counts, axes, degree, results.reshape(-1), len(results), *work)
         results[steep[: len(results)]] = np.nan
-
-
-@helper
-def neighbourhood(faces, indptr, corners, c, rings, stamp, around):
-    """Write c and the vertices of `rings` rings of faces around it to `around`; how many they are."""
-    stamp[c] = c
-    around[0] = c
-    begin, end = 0, 1
-    for _ in range(rings):
-        new = end
-        for q in range(begin, end):
-            v = around[q]
-            # Of a vertex of very many faces, a pole, some stand for all: else its neighbours' fits would each
-            # look at all of them.
-            for k in range(indptr[v], indptr[v + 1], max(1, (indptr[v + 1] - indptr[v]) // CROWDED)):
-                f = corners[k] >> 2
-                for s in range(4):
-                    x = faces[4 * f + s]
-                    if x >= 0 and stamp[x] != c:
-                        stamp[x] = c
-                        around[new] = x
-                        new += 1
-        begin, end = end, new
-    return end
-
-
-@kernel
-def _neighbourhoods(
-    points, faces, indptr, corners, normals, sided, vertices, rings, P, counts, axes, stamp, around
-):
-    room = P.size // (4 * LANES * BLOCKS)
-    for k in range(counts.size * LANES):
-        block, lane, first = k // LANES, k % LANES, k // LANES * room
-        c, m, steep = vertices[min(k, vertices.size - 1)], 0, False
-        if k < vertices.size:
-            m = neighbourhood(faces, indptr, corners, c, rings, stamp, around)
-        if m > room:
-            return m
-        if sided and rings > 1:
-            for i in range(1, m):
-                if 3 * around[i] < normals.size:
-                    steep |= turned(normals, around[i], c)
-        m = 0 if steep else m
-        for i in range(m):
-            add_point(points, around[i], c, P, first + i, lane)
-        count = 0 if lane == 0 else counts[block]
-        for i in range(count, m):
-            for other in range(lane):  # whose neighbourhoods end before
-                no_point(P, first + i, other)
-        for i in range(m, count):
-            no_point(P, first + i, lane)
-        counts[block] = max(count, m)
-        vertex_normal(normals, c, axes, block, lane)
-    return room
 
 
 def face_fits(points, faces, indptr, corners, normals, sided, vertices, degree, rings, out):
@@ -519,7 +388,7 @@ def face_fits(points, faces, indptr, corners, normals, sided, vertices, degree, 
     for start in range(0, len(vertices), BLOCKS * LANES):
         some, results = flat(vertices[start : start + BLOCKS * LANES]), out[start : start + BLOCKS * LANES]
         counts = np.empty(-(-len(results) // LANES), np.int64)
-        while (found := _neighbourhoods(*given, sided, some, rings, P, counts, axes, stamp, around)) > room:
+        while (found := neighbourhoods(*given, sided, some, rings, P, counts, axes, stamp, around)) > room:
             stamp.fill(-1)
             room = 2 * found
             P = np.empty(BLOCKS * room * 4 * LANES)
