@@ -1,16 +1,17 @@
 """Rings at the border, closed.
 
-A vertex at the border has a ring that is open: a scheme knows nothing there until points beyond the border,
+A vertex at the border has an open ring, and a scheme knows nothing there until points beyond the border,
 ghosts, close it. With boundary="extrapolate" they come, in this order of preference,
 
 1. by index: the strips of quads inward from the border are continued by the quartic through five points,
    X_-1 = 5 X_0 - 10 X_1 + 10 X_2 - 5 X_3 + X_4, where the points are smooth functions of their index. The
    border then has the order and the error of the inside;
 2. by arc length: the same on cumulative chord lengths, where the spacing is not smooth but the lines are;
-3. from a surface: where the strips are rough (a position is off by more than the extrapolation bears), too
-   short, or not to be traced (triangles, extraordinary vertices, re-entrant corners), or where their ghosts
-   do not lie outside, the ghosts are read off a polynomial surface fitted at the vertex.
+3. from a surface: where strips are rough, too short or not to be traced (triangles, extraordinary vertices,
+   re-entrant corners), or where their ghosts do not lie outside, ghosts are read off a polynomial surface
+   fitted at the vertex. So are whole rings at the poles of a grid, sides that are one point, and beside them.
 
+Where a strip is neither clearly smooth nor clearly rough the way of the least estimated error is taken.
 Open stay, and have no curvature: isolated vertices, those of several fans of faces or of an edge of more
 than two, and those whose neighbours are too few for a surface.
 """
@@ -22,10 +23,11 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from quadcurv.boundary.cells import cells_at_poles, closed_cells
 from quadcurv.boundary.closing import EXTRAPOLATED, FITTED, INTERIOR, OPEN, REACH, closed
 from quadcurv.boundary.mirror import mirrored
-from quadcurv.boundary.poles import closed_grid, parts_at_poles, poles
-from quadcurv.boundary.sides import cell_ghosts, frame, ghost_layer
+from quadcurv.boundary.poles import closed_grid, parts_at_poles, poles, welded
+from quadcurv.boundary.sides import frame, ghost_layer, part_around
 from quadcurv.boundary.strips import ghosts
 from quadcurv.boundary.strips import roughness as rough_lines
 from quadcurv.boundary.surface import fitted
@@ -41,6 +43,7 @@ __all__ = [
     "OPEN",
     "REACH",
     "boundary_treatment",
+    "cells_at_poles",
     "checked_boundary",
     "closed",
     "fitted",
@@ -49,8 +52,11 @@ __all__ = [
     "ghosts",
     "mirrored",
     "one_rings",
+    "part_around",
     "parts_at_poles",
+    "poles",
     "roughness",
+    "welded",
 ]
 
 BOUNDARIES = ("extrapolate", "nan")
@@ -129,9 +135,8 @@ def _treated(mesh: Mesh, boundary: str) -> tuple[Stencils, NDArray[np.uint8]]:
     checked_boundary(boundary)
     if isinstance(mesh, QuadGrid) and mesh.mask is not None:
         mesh = mesh.to_mesh()
-    found = poles(mesh) if isinstance(mesh, QuadGrid) else []
     given = mesh.stencils()
-    if isinstance(mesh, QuadGrid) and found:
+    if isinstance(mesh, QuadGrid) and (found := poles(mesh)):
         treated, treatment = closed_grid(mesh, found)
         if boundary == "nan":
             treatment = np.where(given.closed, treatment, OPEN).astype(np.uint8)
@@ -141,23 +146,7 @@ def _treated(mesh: Mesh, boundary: str) -> tuple[Stencils, NDArray[np.uint8]]:
         return given, np.where(given.closed, INTERIOR, OPEN).astype(np.uint8)
     if not isinstance(mesh, StaggeredGrid):
         return closed(given)
-    return _ghosted_cells(mesh)
-
-
-def _ghosted_cells(grid: StaggeredGrid) -> tuple[Stencils, NDArray[np.uint8]]:
-    centres, rough = cell_ghosts(grid)
-    r, c = grid.shape
-    index = np.full((r + 2, c + 2), -1, np.int32)
-    index[1:-1, 1:-1] = np.arange(r * c).reshape(r, c)
-    for axis in (0, 1):
-        if grid.wrap[axis]:
-            np.moveaxis(index, axis, 0)[[0, -1]] = np.moveaxis(index, axis, 0)[[-2, 1]]
-    known = (index < 0) & np.isfinite(centres).all(axis=2)
-    index[known] = np.arange(r * c, r * c + np.count_nonzero(known))
-    treated = grid.diamonds(index, centres[known])
-    closes = np.where(rough.ravel(), FITTED, EXTRAPOLATED)
-    treatment = np.where(grid.stencils().closed, INTERIOR, np.where(treated.closed, closes, OPEN))
-    return treated, treatment.astype(np.uint8)
+    return closed_cells(mesh)
 
 
 @np.errstate(all="ignore")

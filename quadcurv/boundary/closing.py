@@ -12,7 +12,7 @@ from quadcurv.boundary.stars import Stars, fans, regular_stars, stars
 from quadcurv.boundary.strips import Ghosts, ghosts
 from quadcurv.boundary.surface import fitted
 from quadcurv.stencils import Stencils
-from quadcurv.types import Indices, Ints
+from quadcurv.types import Bools, Floats, Indices, Ints
 
 OPEN, INTERIOR, EXTRAPOLATED, FITTED = 0, 1, 2, 3
 REACH = NODES - 1  # faces from the border inward that closing it looks at
@@ -45,44 +45,61 @@ def closed(given: Stencils, pole: Indices | None = None) -> tuple[Stencils, NDAr
     extrapolated = np.isfinite(layer.error)
     for rows, _ in star_of:
         extrapolated[rows] = False
+        treatment[vertices[rows]] = FITTED
     treatment[vertices[extrapolated]] = EXTRAPOLATED
-    centres = vertices[np.concatenate([rows for rows, _ in star_of] or [np.empty(0, np.int64)])]
-    treatment[centres] = FITTED
 
     # Ghost quads around vertices that they close, over the points of the mesh and then the ghosts.
-    n = len(given.points)
     near = np.concatenate((extrapolated, np.zeros(len(layer.points), bool)))
     quads = layer.quads[near[layer.quads].any(axis=1)]
-    index = np.concatenate((vertices, n + np.arange(len(layer.points))))
-    points, faces = [given.points, layer.points], [given.faces, index[quads]]
+    index = np.concatenate((vertices, len(given.points) + np.arange(len(layer.points))))
+    treated = _joined(given, layer.points, index[quads], treatment != OPEN)
+    treated = with_stars(treated, [(vertices[rows], star) for rows, star in star_of])
+    treatment[~treated.closed] = OPEN
+    return treated, treatment
+
+
+def with_stars(given: Stencils, star_of: list[tuple[Indices, Stars]]) -> Stencils:
+    """Stencils with stars in place of the rings of some vertices."""
+    if not star_of:
+        return given
     # A star is no part of the mesh: there, copies take the places of centres.
-    size = n + len(layer.points)
-    copies = np.append(np.arange(size), -1)
-    copies[centres] = size + np.arange(centres.size)
-    points.append(given.points[centres])
-    faces = [copies[f] for f in faces]
-    size += centres.size
+    n, centres = len(given.points), np.concatenate([rows for rows, _ in star_of])
+    copies = np.append(np.arange(n), -1)
+    copies[centres] = n + np.arange(centres.size)
+    points, faces, size = [given.points[centres]], [], n + centres.size
     for rows, star in star_of:
-        k, extra = rows.size, len(star.points) - rows.size
-        index = np.concatenate((vertices[rows], size + np.arange(extra), [-1]))
-        points.append(star.points[k:])
+        extra = len(star.points) - rows.size
+        index = np.concatenate((rows, size + np.arange(extra), [-1]))
+        points.append(star.points[rows.size :])
         faces.append(index[star.faces])
         size += extra
-    table = np.concatenate(faces).astype(np.int32)
-    places = np.concatenate(points)
-    lost = ~np.isfinite(places).all(axis=1)
-    if lost.any():  # ghosts that overflow close nothing
-        bad = np.append(lost, False)[table].any(axis=1)
-        around = table[bad]
-        around = around[(around >= 0) & (around < given.n)]
-        treatment[around[treatment[around] > INTERIOR]] = OPEN
-        places[lost], table = given.points[0], table[~bad | (np.arange(len(table)) < len(given.faces))]
     polygons = given.polygons
     if polygons is not None:
-        face = np.pad(polygons.face, (0, len(table) - len(given.faces)), constant_values=-1)
-        polygons = polygons._replace(corners=copies[polygons.corners].astype(np.int32), face=face)
-    treated = replace(given, points=places, faces=table, closed=treatment != OPEN, polygons=polygons)
-    return treated, treatment
+        polygons = polygons._replace(corners=copies[polygons.corners].astype(np.int32))
+    own = replace(given, faces=copies[given.faces].astype(np.int32), polygons=polygons)
+    closed = given.closed.copy()
+    closed[centres] = True
+    return _joined(own, np.concatenate(points), np.concatenate(faces), closed)
+
+
+def _joined(given: Stencils, points: Floats, faces: Indices, closed: Bools) -> Stencils:
+    """Stencils with more points, and faces of them that close rings."""
+    lost = np.concatenate((np.zeros(len(given.points), bool), ~np.isfinite(points).all(axis=1), [False]))
+    if lost.any():  # what overflows closes nothing
+        bad = lost[faces].any(axis=1)
+        opened = faces[bad]
+        closed[opened[(opened >= 0) & (opened < given.n)]] = False
+        points, faces = np.where(lost[len(given.points) : -1, None], given.points[0], points), faces[~bad]
+    polygons = given.polygons
+    if polygons is not None:
+        polygons = polygons._replace(face=np.pad(polygons.face, (0, len(faces)), constant_values=-1))
+    return replace(
+        given,
+        points=np.concatenate((given.points, points)),
+        faces=np.concatenate((given.faces, faces.astype(np.int32).reshape(-1, 4))),
+        closed=closed,
+        polygons=polygons,
+    )
 
 
 def _stars(part: Stencils, layer: Ghosts) -> list[tuple[Indices, Stars]]:

@@ -1,10 +1,9 @@
 """Lines of points that end at the border, continued by ghosts; and how far these are off.
 
-A polynomial through the first points of a line X_0, X_1, ... is read off beyond X_0: by index, X_-1 = 5 X_0
-- 10 X_1 + 10 X_2 - 5 X_3 + X_4, where the points are smooth functions of their index, else by arc length,
-on cumulative chord lengths, at the mirror images of X_1, X_2. What a sixth point would change tells the
-error. It is clearly less than what the fifth has changed where the line is smooth, twice as much where
-there is noise.
+A polynomial through the first points of a line X_0, X_1, ... is read off beyond X_0: by index, X_-1 = 5 X_0 -
+10 X_1 + 10 X_2 - 5 X_3 + X_4, where the points are smooth functions of their index, else by arc length, on
+cumulative chord lengths, at the mirror images of X_1, X_2. What a sixth point would change tells the error:
+clearly less than what the fifth has changed where the line is smooth, twice as much where there is noise.
 """
 
 from __future__ import annotations
@@ -18,10 +17,10 @@ from quadcurv.types import Bools, Floats, Indices
 
 NODES = 6  # of a line; the last one may be missing
 # A line is smooth where, in squares, the last point changes less than this part of what the last but one
-# does;
-# along the normal, where noise of the surface shows, but for this part of all the last but one does.
-SMOOTH, HIDDEN = 0.15, 0.002
-ROUNDING = 2.0**-92  # of coordinates, as extrapolation magnifies it
+# does, or this part of what the one before does (the last but one does nothing where a line is odd); along
+# the normal, where noise of the surface shows, but for this part of all that the last but one does.
+SMOOTH, EARLIER, HIDDEN = 0.15, 0.002, 0.002
+ROUNDING = 2.0**-96  # of coordinates, squared, as extrapolation magnifies it
 # Fourth-order schemes ask for more: the last point changes no more than this, squared, of what the changes of
 # the two points before it, as a geometric series, lead to expect.
 _EXPECTED = 9.0
@@ -55,6 +54,7 @@ def index_weights(degree: int, layer: int = 1) -> Floats:
     )
 
 
+@np.errstate(all="ignore")  # what overflows, or has no length, is NaN and has no ghosts
 def extended(lines: Floats, turn: Floats, degree: int, layers: int, beside: Indices) -> Continued:
     """Continue lines by ghosts.
 
@@ -70,19 +70,28 @@ def extended(lines: Floats, turn: Floats, degree: int, layers: int, beside: Indi
         Lines that end beside each other, all in the same sense.
     """
     x = lines - lines[:, :1]  # an offset costs no digits
+    size = np.linalg.norm(x[:, 1], axis=1)
+    size = np.where(size > 0, size, 1.0)[:, None]
+    x /= size[:, None]  # so that no power of lengths is too large or too small
+    normal = np.cross(x[:, 1], _sideways(lines[:, 0], beside) / size)
+    normal /= np.linalg.norm(normal, axis=1, keepdims=True)
+    rounding = ROUNDING * sum(_dot(far, far) for far in (lines[:, 0] / size, lines[:, 4] / size))
+    ends = _Ends(x[:, 1], normal, turn, rounding, beside)
     terms = np.stack([np.einsum("j,kjx->kx", w, x[:, : w.size]) for w in _DIFFERENCES])
     every = np.ones(len(lines), bool)
-    ghosts = continued(lines[:, : degree + 1], layers, every)
-    error, even = _error(terms, ghosts - lines[:, :1], lines, turn, beside, degree)
-    if even.all():
-        return Continued(ghosts, error, even, even)
-    s, table = _newton(x)
-    terms = np.stack([table[:, k] * np.prod(_beyond(s, 0)[:, None] - s[:, :k], axis=1) for k in (3, 4, 5)])
-    by_length = continued(lines[:, : degree + 1], layers, ~every)
-    other, smooth = _error(terms, by_length - lines[:, :1], lines, turn, beside, degree)
-    by_index = even | (~smooth & (error <= other))
-    ghosts = np.where(by_index[:, None, None], ghosts, by_length)
-    return Continued(ghosts, np.where(by_index, error, other), even | smooth, even)
+    ghosts = continued(x[:, : degree + 1], layers, every)
+    error, even = _error(terms, ghosts, ends, degree)
+    smooth = even
+    if not even.all():
+        s, table = _newton(x)
+        steps = _beyond(s, 0)[:, None] - s
+        terms = np.stack([table[:, k] * np.prod(steps[:, :k], axis=1) for k in (3, 4, 5)])
+        by_length = continued(x[:, : degree + 1], layers, ~every)
+        other, smooth = _error(terms, by_length, ends, degree)
+        by_index = even | (~smooth & (error <= other))
+        ghosts = np.where(by_index[:, None, None], ghosts, by_length)
+        error = np.where(by_index, error, other)
+    return Continued(lines[:, :1] + ghosts * size[:, None], error * size[:, 0], even | smooth, even)
 
 
 def continued(lines: Floats, layers: int, even: Bools) -> Floats:
@@ -92,43 +101,51 @@ def continued(lines: Floats, layers: int, even: Bools) -> Floats:
     weights = np.stack([index_weights(degree, m + 1) for m in range(layers)])
     ghosts = np.einsum("lj,kj...->kl...", weights, x)
     if not even.all():
-        at = ~even
-        s, table = _newton(x[at])
-        ghosts[at] = np.stack([_value(s, table, _beyond(s, m)) for m in range(layers)], axis=1)
+        size = np.abs(x[~even]).max(axis=tuple(range(1, x.ndim)), keepdims=True)
+        size = np.where(size > 0, size, 1.0)
+        s, table = _newton(x[~even] / size)
+        ghosts[~even] = size * np.stack([_value(s, table, _beyond(s, m)) for m in range(layers)], axis=1)
     return lines[:, :1] + ghosts
 
 
 _DIFFERENCES = [np.array([(-1.0) ** j * comb(order, j) for j in range(order + 1)]) for order in (3, 4, 5)]
 
 
-def _error(
-    terms: Floats, ghosts: Floats, lines: Floats, turn: Floats, beside: Indices, degree: int
-) -> tuple[Floats, Bools]:
+class _Ends(NamedTuple):
+    """Where lines end: the first step inward and the normal, and what else a ghost's error rests on."""
+
+    inward: Floats
+    normal: Floats
+    turn: Floats
+    rounding: Floats
+    beside: Indices
+
+
+def _error(terms: Floats, ghosts: Floats, ends: _Ends, degree: int) -> tuple[Floats, Bools]:
     """Estimated error of ghosts, relative to X_0, and whether they are smooth beyond doubt.
 
     `terms` (3, k, 3) are what the fourth, fifth and sixth point of lines change.
     """
+    inward, normal, turn, rounding, beside = ends
     short = np.isnan(terms[2]).any(axis=1, keepdims=True)
     last, before = np.where(short, terms[1], terms[2]), np.where(short, terms[0], terms[1])
-    inward = lines[:, 1] - lines[:, 0]
-    with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
-        normal = np.cross(inward, _sideways(lines[:, 0], beside))
-        normal /= np.linalg.norm(normal, axis=1, keepdims=True)
-        along, all_ = _dot(last, normal) ** 2, _dot(last, last)
-        most = SMOOTH * _dot(before, normal) ** 2 + HIDDEN * _dot(before, before)
-        if degree > 4:
-            most = np.minimum(most, _EXPECTED * _dot(before, before) ** 2 / _dot(terms[0], terms[0]))
-        excess = np.maximum(all_ - SMOOTH * _dot(before, before), along - most)
-        excess -= ROUNDING * (_dot(lines[:, 0], lines[:, 0]) + _dot(lines[:, 4], lines[:, 4]))
-        steps = np.diff(ghosts, axis=1, prepend=0.0)
-        outward, edge = -np.einsum("klx,kx->kl", steps, inward), _dot(inward, inward)
-        outside = (outward[:, 0] > 0.2 * edge) & (outward > 0).all(axis=1)
-        outside &= _dot(ghosts[:, 0], ghosts[:, 0]) < 4 * edge
-        smooth = without_excess(np.where(outside, excess, np.inf), beside)
-        # Along the surface an error does harm by as much as the surface turns from point to point.
-        square = _around(along + turn**2 * all_, beside)
-        calm = _around(along, beside) < _CALM * _around(_dot(before, normal) ** 2, beside)
-        error = np.sqrt(np.where(calm & (degree < 5), _FAITHFUL, 1.0) * square)
+    earlier = np.where(short, 0.0, terms[0])
+    along, all_ = _dot(last, normal) ** 2, _dot(last, last)
+    expected = np.maximum(SMOOTH * _dot(before, before), EARLIER * _dot(earlier, earlier))
+    most = np.maximum(SMOOTH * _dot(before, normal) ** 2, EARLIER * _dot(earlier, normal) ** 2)
+    most += HIDDEN * _dot(before, before)
+    if degree > 4:
+        most = np.minimum(most, _EXPECTED * _dot(before, before) ** 2 / _dot(terms[0], terms[0]))
+    excess = np.maximum(all_ - expected, along - most) - rounding
+    steps = np.diff(ghosts, axis=1, prepend=0.0)
+    outward, edge = -np.einsum("klx,kx->kl", steps, inward), _dot(inward, inward)
+    outside = (outward[:, 0] > 0.2 * edge) & (outward > 0).all(axis=1)
+    outside &= _dot(ghosts[:, 0], ghosts[:, 0]) < 4 * edge
+    smooth = without_excess(np.where(outside, excess, np.inf), beside)
+    # Along the surface an error does harm by as much as the surface turns from point to point.
+    square = _around(along + turn**2 * all_, beside)
+    calm = _around(along, beside) < _CALM * _around(_dot(before, normal) ** 2, beside)
+    error = np.sqrt(np.where(calm & (degree < 5), _FAITHFUL, 1.0) * square)
     return np.where(outside & ~np.isnan(error), error, np.inf), smooth
 
 

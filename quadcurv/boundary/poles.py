@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from quadcurv.boundary.closing import REACH, closed
-from quadcurv.mesh import QuadGrid
+from quadcurv.mesh import QuadGrid, StaggeredGrid
 from quadcurv.stencils import Stencils, grid_faces
 from quadcurv.types import Bools, Indices, Ints
 
@@ -27,13 +27,16 @@ class Pole(NamedTuple):
 
 
 @np.errstate(all="ignore")
-def poles(grid: QuadGrid) -> list[Pole]:
-    """The sides of a grid that are one point."""
-    found = []
+def poles(grid: QuadGrid | StaggeredGrid) -> list[Pole]:
+    """The sides of a grid, or of the corners of its cells, that are one point."""
+    found: list[Pole] = []
+    points = grid.points if isinstance(grid, QuadGrid) else grid.dual
+    if isinstance(grid, QuadGrid) and grid.mask is not None:
+        return found
     for axis in (0, 1):
-        if grid.wrap[axis] or grid.mask is not None:
+        if grid.wrap[axis]:
             continue
-        rows = np.moveaxis(grid.points, axis, 0)
+        rows = np.moveaxis(points, axis, 0)
         for end in (0, -1):
             side, beside = rows[end], rows[1 if end == 0 else -2]
             step = np.linalg.norm(beside[0] - side[0])
@@ -45,8 +48,8 @@ def poles(grid: QuadGrid) -> list[Pole]:
     return found
 
 
-def closed_grid(grid: QuadGrid, found: list[Pole]) -> tuple[Stencils, NDArray[np.uint8]]:
-    """Stencils with closed rings, each point of a pole with the same one, and what closes each."""
+def welded(grid: QuadGrid, found: list[Pole]) -> tuple[Stencils, Indices]:
+    """Stencils with one vertex and triangles at each pole; that vertex for each point of a pole, else -1."""
     vertex = np.arange(grid.shape[0] * grid.shape[1], dtype=np.int32).reshape(grid.shape)
     pole = np.full(grid.shape, -1)
     for axis, end in found:
@@ -55,13 +58,17 @@ def closed_grid(grid: QuadGrid, found: list[Pole]) -> tuple[Stencils, NDArray[np
         np.moveaxis(pole, axis, 0)[end] = side[0]
     faces = grid_faces(np.pad(vertex, [(0, int(w)) for w in grid.wrap], mode="wrap"))
     given = grid.stencils()
-    welded = Stencils(given.points, _without_repetition(faces), given.shape, given.closed)
-    return closed(welded, pole.ravel())
+    return Stencils(given.points, _without_repetition(faces), given.shape, given.closed), pole.ravel()
+
+
+def closed_grid(grid: QuadGrid, found: list[Pole]) -> tuple[Stencils, NDArray[np.uint8]]:
+    """Stencils with closed rings, each point of a pole with the same one, and what closes each."""
+    return closed(*welded(grid, found))
 
 
 @np.errstate(all="ignore")
 def parts_at_poles(grid: QuadGrid) -> list[tuple[Indices, QuadGrid, Bools]]:
-    """Grids of the rows near each pole, their vertices in the whole, which of them are at or beside it."""
+    """Vertices of the rows near each pole, the grids of these, which of them are at or beside it."""
     near: list[tuple[Indices, QuadGrid, Bools]] = []
     found = poles(grid)
     if not found:

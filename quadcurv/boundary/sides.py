@@ -5,9 +5,7 @@ from __future__ import annotations
 import numpy as np
 import scipy
 
-from quadcurv.boundary.lines import HIDDEN, NODES, ROUNDING, SMOOTH, extended, index_weights, without_excess
-from quadcurv.boundary.stars import bent
-from quadcurv.boundary.surface import fitted
+from quadcurv.boundary.lines import EARLIER, HIDDEN, NODES, ROUNDING, SMOOTH, index_weights, without_excess
 from quadcurv.mesh import QuadGrid, StaggeredGrid
 from quadcurv.stencils import Frame, Stencils
 from quadcurv.types import Bools, Floats, Indices, Ints, MeshError
@@ -89,7 +87,7 @@ def frame(grid: QuadGrid | StaggeredGrid, boundary: str) -> tuple[Frame, Indices
         if wrap[axis] or boundary == "nan":
             continue
         for end in (0, 1):
-            even = _continue(points, axis, end, outside[end], wrap[1 - axis])
+            even = continued_side(points, axis, end, outside[end], wrap[1 - axis])
             if even is not None:
                 bad = np.zeros((r, c), bool) if bad is None else bad
                 np.moveaxis(bad, axis, 0)[-end] |= _unserved(even, wrap[1 - axis])
@@ -106,7 +104,7 @@ def _at_corner(lines: Floats) -> Floats:
     return lines[:, 0] + _WEIGHTS @ (lines[:, : DEGREE + 1] - lines[:, :1])
 
 
-def _continue(points: Floats, axis: int, end: int, ghosts: Floats, wraps: bool) -> Bools | None:
+def continued_side(points: Floats, axis: int, end: int, ghosts: Floats, wraps: bool) -> Bools | None:
     """Write ghosts beyond a side; which lines are even, None if all are."""
     from quadcurv.kernels import border
 
@@ -117,7 +115,7 @@ def _continue(points: Floats, axis: int, end: int, ghosts: Floats, wraps: bool) 
     first = end * inward * (points.shape[axis] - 1)
     excess = np.empty(size)
     way = inward * (1 - 2 * end)
-    limits = SMOOTH, HIDDEN, ROUNDING
+    limits = SMOOTH, EARLIER, HIDDEN, ROUNDING
     border.continue_side(points, first, along, way, wraps, limits, ghosts, excess)
     return without_excess(excess, _beside(size, wraps)) if excess.max() > 0 else None
 
@@ -138,50 +136,24 @@ def _beside(size: int, wraps: bool) -> Indices:
     return pairs % size if wraps else pairs[:-1]
 
 
-@np.errstate(all="ignore")
-def cell_ghosts(grid: StaggeredGrid) -> tuple[Floats, Bools]:
-    """Centres of ghost cells around a staggered grid, (r + 2, c + 2, 3) with its own in the middle.
-
-    By index where the centres are even, else on a surface fitted at the centre beside; NaN where nothing is
-    known. Second, which (r, c) have one of the last kind.
-    """
-    r, c = grid.shape
-    x = np.pad(grid.primal, [(1, 1), (1, 1), (0, 0)], constant_values=np.nan)
-    rough, stencils = np.zeros(grid.shape, bool), grid.stencils()
-    for axis, size in ((0, c), (1, r)):
-        inner, beyond = np.moveaxis(grid.primal, axis, 0), np.moveaxis(x, axis, 0)
-        if grid.wrap[axis]:
-            beyond[[0, -1], 1:-1] = inner[[-1, 0]]
-            continue
-        dual = np.moveaxis(grid.dual, axis, 0)
-        number = np.moveaxis(np.arange(r * c).reshape(r, c), axis, 0)
-        for end, next_, far in ((0, 1, 1), (-1, -2, -2)):
-            ghosts = np.empty((size, 3))
-            even = _continue(grid.primal, axis, -end, ghosts, grid.wrap[1 - axis])
-            if even is not None and len(inner) >= NODES:
-                lines = np.moveaxis(inner[:: -1 if end else 1][:NODES], 0, 1)
-                found = extended(lines, np.zeros(size), DEGREE, 1, _beside(size, grid.wrap[1 - axis]))
-                smooth = found.smooth & ~even
-                ghosts[smooth], even = found.ghosts[smooth, 0], even | smooth
-            at = np.empty(0, int) if even is None else np.flatnonzero(~even)
-            if at.size:
-                edges = np.stack((dual[end][at], dual[end][at + 1], dual[far][at], dual[far][at + 1]), axis=1)
-                across = inner[next_][at] if len(inner) > 1 else None
-                ghosts[at] = _fitted_cells(stencils, number[end][at], edges, across)
-                np.moveaxis(rough, axis, 0)[end][at] = True
-            beyond[end, 1:-1] = ghosts
-    return x, rough
-
-
-def _fitted_cells(stencils: Stencils, vertices: Indices, edges: Floats, across: Floats | None) -> Floats:
-    """Centres beyond border edges: a parallelogram, bent as the one on the cell's other side is.
-
-    `edges` (k, 4, 3) are the ends of these edges and of the opposite ones, `across` the centres beyond those.
-    """
-    surfaces = fitted(stencils, vertices)
-    x = surfaces.flat(edges)
-    ghost = x[:, 0] + x[:, 1]
-    if across is not None:
-        twist = surfaces.flat(across[:, None])[:, 0] - x[:, 2] - x[:, 3]
-        ghost += bent(twist, x[:, 0], x[:, 1])
-    return surfaces.lifted(ghost[:, None])[:, 0]
+def part_around(grid: QuadGrid, vertices: Indices, reach: int) -> tuple[Indices, Stencils]:
+    """Vertices of the part of a grid within `reach` quads of some, these first, and its stencils."""
+    (r, c), wrap = grid.shape, grid.wrap
+    near, step = np.zeros((r, c), bool), np.arange(-reach, reach + 1)
+    i, j = np.divmod(vertices, c)
+    i, j = i[:, None, None] + step[:, None], j[:, None, None] + step
+    near[i % r if wrap[0] else i.clip(0, r - 1), j % c if wrap[1] else j.clip(0, c - 1)] = True
+    near.ravel()[vertices] = False
+    kept = np.concatenate((vertices, np.flatnonzero(near)))
+    place = np.full((r, c), -1, np.int32)
+    place.ravel()[kept] = np.arange(kept.size)
+    # Each quad by its first vertex.
+    i, j = np.divmod(kept, c)
+    inside = (wrap[0] | (i < r - 1)) & (wrap[1] | (j < c - 1))
+    i, j = i[inside], j[inside]
+    i, j = np.stack((i, i + 1, i + 1, i)) % r, np.stack((j, j, j + 1, j + 1)) % c
+    faces = place[i, j].T
+    i, j = np.divmod(kept, c)
+    closed = (wrap[0] | ((i > 0) & (i < r - 1))) & (wrap[1] | ((j > 0) & (j < c - 1)))
+    points = grid.points.reshape(-1, 3)[kept]
+    return kept, Stencils(points, np.ascontiguousarray(faces[(faces >= 0).all(axis=1)]), kept.shape, closed)

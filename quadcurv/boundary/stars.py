@@ -17,8 +17,7 @@ from quadcurv.types import Bools, Floats, Indices, Ints
 
 _NARROW = np.radians(10)  # a gap less than that leaves no room for a face
 _BENT = 0.1  # how far a ghost quad may be from a parallelogram, in sums of its edges
-# Which edges of so many quads, or triangles, have mirror images that make them the four, or six, of a
-# lattice.
+# Which edges of so many quads, or triangles, have mirror images that make them four, or six.
 _QUADS = {1: (1, 1), 2: (0, 1, 0), 3: (0, 0, 0, 0)}
 _TRIANGLES = {1: (1, 1), 2: (1, 1, 1), 3: (0, 1, 1, 0), 4: (0, 0, 1, 0, 0), 5: (0, 0, 0, 0, 0, 0)}
 
@@ -195,7 +194,7 @@ def _twists(
     angle = np.arctan2(edges[..., 1], edges[..., 0])
     fan = np.concatenate((np.zeros((n, 1)), np.cumsum(np.diff(angle, axis=1) % (2 * np.pi), axis=1)), axis=1)
     length = np.linalg.norm(ring, axis=2, keepdims=True)
-    unit = ring / length
+    unit = ring / np.where(length > 0, length, 1.0)
     middle = unit[:, :-1] + unit[:, 1:]
     middle = np.arctan2(middle[..., 1], middle[..., 0]) - angle[:, :1]
     twist, parity = np.zeros((*middle.shape, 2)), [0] * middle.shape[1]

@@ -128,7 +128,7 @@ def _frames(normal: Floats) -> Floats:
 def _fits(
     stencils: Stencils, frames: Floats, around: Ints, ring: Ints
 ) -> tuple[Floats, Floats, Floats, Floats, Floats]:
-    """Maps, coefficients, noise, its gain beyond the border and that in H, all (k, fits, ...)."""
+    """Maps, coefficients, noise, its gain beyond the border and in H, all (k, fits, ...)."""
     x = stencils.points[around] - stencils.points[around[:, :1]]
     x = np.einsum("kax,kmx->kma", frames, x)
     known = (around >= 0) & (ring > 0)

@@ -11,7 +11,7 @@ from functools import partial
 import numpy as np
 import scipy
 
-from quadcurv.boundary import REACH, closed, frame, one_rings, parts_at_poles
+from quadcurv.boundary import REACH, cells_at_poles, closed, frame, one_rings, part_around, parts_at_poles
 from quadcurv.drivers import direct
 from quadcurv.mesh import QuadGrid, QuadMesh, StaggeredGrid
 from quadcurv.schemes import Diamond, Laplacian
@@ -46,12 +46,13 @@ def evaluate_grid(
     unserved = _evaluate_rows(grid, scheme.fast, boundary, results)
     if all(grid.wrap) or (isinstance(grid, StaggeredGrid) and grid.has_ghosts):
         return
-    if unserved.size:
-        _evaluate_part(grid, unserved, scheme, results)
     if isinstance(grid, QuadGrid):
         for vertices, part, beside in parts_at_poles(grid):
-            treated = one_rings(part, boundary)
-            _fill(results, vertices[beside], part.stencils(), treated, scheme, np.flatnonzero(beside))
+            treated, rows = one_rings(part, boundary), np.flatnonzero(beside)
+            _fill(results, vertices[rows], part.stencils(), treated, scheme, rows)
+            unserved = np.setdiff1d(unserved, vertices[rows])
+    if unserved.size:
+        _evaluate_part(grid, unserved, scheme, results)
     cut = {"dual_areas"} if boundary == "extrapolate" else {"dual_areas", "vertex_normals"}
     if cut & results.keys():
         _evaluate_sides(grid, scheme, {name: results[name] for name in cut & results.keys()})
@@ -61,15 +62,11 @@ def _evaluate_part(
     grid: QuadGrid | StaggeredGrid, others: Indices, scheme: Laplacian, results: Mapping[str, Floats]
 ) -> None:
     """Vertices that the frame of a grid does not serve, from the stencils of a part around them."""
-    from quadcurv.kernels import topology
-
-    given, place = grid.stencils(), others
     if isinstance(grid, QuadGrid):
-        vertices, faces = topology.part_around(given.faces, others, given.n, REACH)
-        given = Stencils(given.points[vertices], faces, (vertices.size,), given.closed[vertices])
-        treated, place = closed(given)[0], np.arange(others.size)
+        given, place = part_around(grid, others, REACH)[1], np.arange(others.size)
+        treated = closed(given)[0]
     else:
-        treated = one_rings(grid)
+        given, place, treated = grid.stencils(), others, one_rings(grid)
     _fill(results, others, given, treated, scheme, place)
 
 
@@ -113,8 +110,7 @@ def _evaluate_rows(
     r, c = grid.shape
     if isinstance(grid, QuadGrid):
         around, unserved = frame(grid, boundary)
-        beyond, beside = map(flat, around)
-        kernel = partial(rows.grid_curvatures, flat(grid.points), 3 * c, beyond, beside, liu, *wanted)
+        kernel = partial(rows.grid_curvatures, flat(grid.points), 3 * c, *_flat(around), liu, *wanted)
     else:
         dual = grid.dual
         for axis in (0, 1):
@@ -129,10 +125,17 @@ def _evaluate_rows(
             points = points[size + 3 :]
         else:
             around, unserved = frame(grid, boundary)
-        beyond, beside = map(flat, around)
-        kernel = partial(cells.staggered_curvatures, points, size, beyond, beside, flat(dual), liu, *wanted)
+            if boundary == "extrapolate":
+                unserved = np.union1d(unserved, cells_at_poles(grid))
+        kernel = partial(cells.staggered_curvatures, points, size, *_flat(around), flat(dual), liu, *wanted)
     ranges.over(kernel, r, r * c, rows.LEAST_ROWS)
     return unserved
+
+
+def _flat(frame: Frame) -> tuple[Floats, Floats]:
+    from quadcurv.kernels.compiled import flat
+
+    return flat(frame.beyond), flat(frame.beside)
 
 
 def _wanted(results: Mapping[str, Floats]) -> list[Floats]:

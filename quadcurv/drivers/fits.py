@@ -15,7 +15,16 @@ from typing import Any, NamedTuple
 import numpy as np
 import scipy
 
-from quadcurv.boundary import REACH, checked_boundary, fitted, ghost_layer, ghosts, mirrored
+from quadcurv.boundary import (
+    REACH,
+    checked_boundary,
+    fitted,
+    ghost_layer,
+    ghosts,
+    mirrored,
+    poles,
+    welded,
+)
 from quadcurv.mesh import Mesh, QuadGrid, QuadMesh, StaggeredGrid
 from quadcurv.schemes import Curvatures, Fit, StandardErrors
 from quadcurv.stencils import Stencils
@@ -63,15 +72,16 @@ class MeshNeighbourhoods:
     def polynomials(self, vertices: Indices, degree: int, rings: int, ghosts: bool = True) -> Floats:
         """(k, COLUMNS): see `Neighbourhoods`."""
         out = (self._windows or self._faces).polynomials(vertices, degree, rings)
-        for faces, place, reach in self._beyond(rings) if ghosts else ():
+        for faces, place, reach in (*(self._beyond(rings) if ghosts else ()), *self._at_poles(rings)):
             at = place[vertices]
-            out[at >= 0] = faces.polynomials(at[at >= 0], degree, reach)
+            once, again = np.unique(at[at >= 0], return_inverse=True)  # all points of a pole are one vertex
+            out[at >= 0] = faces.polynomials(once, degree, reach)[again]
         return out
 
     def positions(self, vertices: Indices, rings: int) -> tuple[Floats, Floats]:
         """(k, m, 3) and (k, 3): see `Neighbourhoods`."""
         out, normals = self._faces.positions(vertices, rings), self._faces.normals[vertices]
-        for faces, place, reach in self._beyond(rings):
+        for faces, place, reach in (*self._beyond(rings), *self._at_poles(rings)):
             at = place[vertices]
             kept = at >= 0
             out = _replaced(out, kept, faces.positions(at[kept], reach))
@@ -117,6 +127,21 @@ class MeshNeighbourhoods:
                 left &= replaced.place < 0
             self._replaced[rings] += self._mirrored(np.flatnonzero(left), rings)
         return self._replaced[rings]
+
+    def _at_poles(self, rings: int) -> list[_Beyond]:
+        """Rings of triangles around the poles of a grid, in place of windows that see them many times."""
+        return [replaced._replace(reach=rings) for replaced in self._poles]
+
+    @cached_property
+    def _poles(self) -> list[_Beyond]:
+        if not isinstance(self.mesh, QuadGrid) or not (found := poles(self.mesh)):
+            return []
+        stencils, pole = welded(self.mesh, found)
+        near = np.isin(stencils.faces, pole[pole >= 0]).any(axis=1)
+        place = pole.copy()
+        beside = np.setdiff1d(stencils.faces[near], [-1, *pole[pole >= 0]])
+        place[beside] = beside
+        return [_Beyond(_FaceNeighbourhoods(stencils), place, 0)]
 
     def _mirrored(self, vertices: Indices, rings: int) -> list[_Beyond]:
         """Neighbourhoods completed by points of fitted surfaces, as stencils that lead to these points."""
@@ -230,9 +255,7 @@ class _FaceNeighbourhoods:
 
 
 class _Beyond(NamedTuple):
-    """Neighbourhoods that go on beyond the border, `reach` rings of faces, and the places of vertices in
-    them.
-    """
+    """Neighbourhoods of `reach` rings that go on beyond the border, and the places of vertices in them."""
 
     faces: _FaceNeighbourhoods
     place: Indices

@@ -35,8 +35,7 @@ def _rings_around(faces, indptr, corners, vertices, rings, room, stamp, around, 
 
 
 def rings_around(faces, indptr, corners, vertices, rings, room):
-    """Vertices of `rings` rings of faces around each of some vertices, as many whole ones as there is room
-    for.
+    """Vertices of `rings` rings of faces around each of some vertices, as many as there is room for.
 
     Returns
     -------

@@ -1,0 +1,96 @@
+"""Staggered grids: cells beyond open sides, whose centres alone are missing.
+
+By index where the centres are even, else on a surface fitted at the centre beside. Where the corners of a
+side are one point, a pole, the cells there have regular rings on fitted surfaces.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from quadcurv.boundary.closing import EXTRAPOLATED, FITTED, INTERIOR, OPEN, with_stars
+from quadcurv.boundary.poles import poles
+from quadcurv.boundary.sides import continued_side
+from quadcurv.boundary.stars import bent, regular_stars
+from quadcurv.boundary.surface import fitted
+from quadcurv.mesh import StaggeredGrid
+from quadcurv.stencils import Stencils
+from quadcurv.types import Bools, Floats, Indices
+
+
+def closed_cells(grid: StaggeredGrid) -> tuple[Stencils, NDArray[np.uint8]]:
+    """Stencils with closed rings, and what closes each."""
+    centres, rough = _cell_ghosts(grid)
+    r, c = grid.shape
+    index = np.full((r + 2, c + 2), -1, np.int32)
+    index[1:-1, 1:-1] = np.arange(r * c).reshape(r, c)
+    for axis in (0, 1):
+        if grid.wrap[axis]:
+            np.moveaxis(index, axis, 0)[[0, -1]] = np.moveaxis(index, axis, 0)[[-2, 1]]
+    known = (index < 0) & np.isfinite(centres).all(axis=2)
+    index[known] = np.arange(r * c, r * c + np.count_nonzero(known))
+    given, treated = grid.stencils(), grid.diamonds(index, centres[known])
+    closes = np.where(rough.ravel(), FITTED, EXTRAPOLATED)
+    treatment = np.where(given.closed, INTERIOR, np.where(treated.closed, closes, OPEN))
+    at_pole = cells_at_poles(grid)
+    if at_pole.size:
+        surfaces = fitted(given, at_pole)
+        rows = np.flatnonzero(np.isfinite(surfaces.error))
+        treatment[at_pole] = OPEN
+        treatment[at_pole[rows]] = FITTED
+        treated = with_stars(treated, [(at_pole[rows], regular_stars(given, surfaces.of(rows)))])
+        treated.closed[at_pole] = treatment[at_pole] != OPEN
+    return treated, treatment.astype(np.uint8)
+
+
+def cells_at_poles(grid: StaggeredGrid) -> Indices:
+    """Cells, flat, with a side that is one point."""
+    beside = np.zeros(grid.shape, bool)
+    for axis, end in poles(grid):
+        np.moveaxis(beside, axis, 0)[end] = True
+    return np.flatnonzero(beside)
+
+
+@np.errstate(all="ignore")
+def _cell_ghosts(grid: StaggeredGrid) -> tuple[Floats, Bools]:
+    """Centres of ghost cells around a staggered grid, (r + 2, c + 2, 3) with its own in the middle.
+
+    By index where the centres are even, else on a surface fitted at the centre beside; NaN where nothing is
+    known. Second, which (r, c) have one of the last kind.
+    """
+    r, c = grid.shape
+    x = np.pad(grid.primal, [(1, 1), (1, 1), (0, 0)], constant_values=np.nan)
+    rough, stencils = np.zeros(grid.shape, bool), grid.stencils()
+    for axis, size in ((0, c), (1, r)):
+        inner, beyond = np.moveaxis(grid.primal, axis, 0), np.moveaxis(x, axis, 0)
+        if grid.wrap[axis]:
+            beyond[[0, -1], 1:-1] = inner[[-1, 0]]
+            continue
+        dual = np.moveaxis(grid.dual, axis, 0)
+        number = np.moveaxis(np.arange(r * c).reshape(r, c), axis, 0)
+        for end, next_, far in ((0, 1, 1), (-1, -2, -2)):
+            ghosts = np.empty((size, 3))
+            even = continued_side(grid.primal, axis, -end, ghosts, grid.wrap[1 - axis])
+            at = np.empty(0, int) if even is None else np.flatnonzero(~even)
+            if at.size:
+                edges = np.stack((dual[end][at], dual[end][at + 1], dual[far][at], dual[far][at + 1]), axis=1)
+                across = inner[next_][at] if len(inner) > 1 else None
+                ghosts[at] = _fitted_cells(stencils, number[end][at], edges, across)
+                np.moveaxis(rough, axis, 0)[end][at] = True
+            beyond[end, 1:-1] = ghosts
+    return x, rough
+
+
+def _fitted_cells(stencils: Stencils, vertices: Indices, edges: Floats, across: Floats | None) -> Floats:
+    """Centres beyond border edges: a parallelogram, bent as the one on the cell's other side is.
+
+    `edges` (k, 4, 3) are the ends of these edges and of the opposite ones, `across` the centres beyond those.
+    """
+    surfaces = fitted(stencils, vertices)
+    x = surfaces.flat(edges)
+    ghost = x[:, 0] + x[:, 1]
+    if across is not None:
+        twist = surfaces.flat(across[:, None])[:, 0] - x[:, 2] - x[:, 3]
+        ghost += bent(twist, x[:, 0], x[:, 1])
+    return surfaces.lifted(ghost[:, None])[:, 0]

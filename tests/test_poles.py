@@ -1,0 +1,139 @@
+"""Sides of grids that are one point but for rounding."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import quadcurv as qc
+from quadcurv import surfaces
+from quadcurv.boundary import FITTED, INTERIOR, OPEN, boundary_treatment, poles
+from quadcurv.schemes import SCHEMES
+
+ALL = [*SCHEMES]
+DIVERGENT = {name for name, scheme in SCHEMES.items() if scheme.order == 0}
+AXES = np.array([2.0, 1.5, 1.0])
+
+
+def ball(n, m, *, wraps=True, ends=(0.0, np.pi), turned=0.0, axes=(1.0, 1.0, 1.0)):
+    """Longitude by colatitude: points of a sphere or an ellipsoid, about an axis turned by an angle."""
+    t = np.linspace(0, 2 * np.pi, n, endpoint=not wraps)[:, None]
+    p = np.linspace(*ends, m)
+    x = np.stack(np.broadcast_arrays(np.sin(p) * np.cos(t), np.sin(p) * np.sin(t), np.cos(p)), axis=-1)
+    c, s = np.cos(turned), np.sin(turned)
+    return x * axes @ np.array([[c, 0, s], [0, 1, 0], [-s, 0, c]]).T
+
+
+def mean_curvature_of_ellipsoid(points, axes):
+    support = 1 / np.linalg.norm(points / axes**2, axis=-1)
+    return support**3 * (np.sum(axes**2) - np.sum(points**2, axis=-1)) / (2 * np.prod(axes) ** 2)
+
+
+@pytest.mark.parametrize("scheme", [*ALL, "angle_defect"])
+@pytest.mark.parametrize("boundary", ["extrapolate", "nan"])
+def test_poles_and_the_rows_beside_them_are_right(scheme, boundary):
+    """The sine of pi is not quite zero: one pole is one point, the other but for rounding."""
+    grid = qc.QuadGrid(ball(48, 25), (True, False))
+    if scheme == "angle_defect":
+        found = qc.gaussian_curvature(grid, scheme, boundary=boundary)
+    else:
+        found = np.abs(qc.mean_curvature(grid, scheme, boundary=boundary))
+    near = found[:, [0, 1, -2, -1]]
+    if boundary == "nan":
+        assert np.isnan(near[:, [0, -1]]).all()
+        near = near[:, 1:-1]
+    assert np.isfinite(near).all()
+    assert np.abs(near - 1).max() < (0.6 if scheme in DIVERGENT else 0.03)
+
+
+@pytest.mark.parametrize("scheme", ["finite_volume", "cotan-6", "bunge", "jet"])
+def test_second_order_at_the_poles_of_an_ellipsoid(scheme):
+    errors = []
+    for n in (12, 24, 48):
+        points = ball(2 * n, n + 1, axes=AXES)
+        H = np.abs(qc.mean_curvature(qc.QuadGrid(points, (True, False)), scheme))
+        error = np.abs(H - mean_curvature_of_ellipsoid(points, AXES))
+        errors.append(error[:, [0, 1, -2, -1]].max())
+        assert error[:, [0, 1, -2, -1]].max() < 3 * error[:, 2:-2].max()
+    assert errors[-1] < 0.02
+    assert errors[-1] < errors[0] / 8
+
+
+@pytest.mark.parametrize("scheme", ["finite_volume", "de_goes", "cotan-6-voronoi", "jet"])
+@pytest.mark.parametrize("turned", [0.0, 1.0])
+@pytest.mark.parametrize("wraps", [True, False])
+@pytest.mark.parametrize("swapped", [False, True])
+@pytest.mark.parametrize("backwards", [False, True])
+@pytest.mark.parametrize(("scale", "offset"), [(1, 0), (1e-6, 0), (1e6, 0), (1, 1e5)])
+def test_size_place_orientation_and_seam_do_not_matter(
+    scheme, turned, wraps, swapped, backwards, scale, offset
+):
+    points = scale * ball(32 + (not wraps), 17, wraps=wraps, turned=turned) + offset
+    wrap = (wraps, False)
+    if backwards:
+        points = points[:, ::-1]
+    if swapped:
+        points, wrap = np.swapaxes(points, 0, 1), wrap[::-1]
+    grid = qc.QuadGrid(points, wrap)
+    axis = 0 if swapped else 1
+    assert poles(grid) == [(axis, 0), (axis, -1)]
+    H = np.moveaxis(scale * np.abs(qc.mean_curvature(grid, scheme)), axis, 0)
+    assert np.abs(H[[0, 1, -2, -1]] - 1).max() < 0.05
+    for end in (0, -1):  # one point, one value
+        assert np.ptp(H[end]) < 1e-9
+
+
+def test_all_points_of_a_pole_share_everything():
+    grid = qc.QuadGrid(ball(24, 13), (True, False))
+    fits = qc.curvatures(grid)
+    found = qc.evaluate(grid, "mean_curvature", "mean_curvature_normal", "vertex_normals", scheme="liu")
+    arrays = (fits.mean, fits.gaussian, fits.normal, *found.values())
+    for values in arrays:
+        for end in (0, -1):
+            assert np.isfinite(values[:, end]).all()
+            assert np.abs(values[:, end] - values[:1, end]).max() < 1e-12
+    up = found["vertex_normals"][0, [0, -1]]
+    assert np.abs(np.abs(up) - [0, 0, 1]).max() < 1e-2
+
+
+def test_treatment_of_poles():
+    grid = qc.QuadGrid(ball(24, 13), (True, False))
+    treatment = boundary_treatment(grid)
+    assert (treatment[:, [0, 1, -2, -1]] == FITTED).all()
+    assert (treatment[:, 2:-2] == INTERIOR).all()
+    left = boundary_treatment(grid, "nan")
+    assert (left[:, [0, -1]] == OPEN).all()
+    assert (left[:, [1, -2]] == FITTED).all()
+
+
+@pytest.mark.parametrize("scheme", ["finite_volume", "bunge", "jet"])
+def test_an_octant_with_one_side_collapsed(scheme):
+    """A triangular patch: its tip is a corner, where fits look to one side."""
+    t, p = np.linspace(0, np.pi / 2, 17)[:, None], np.linspace(0, np.pi / 2, 17)
+    x = np.stack(np.broadcast_arrays(np.sin(p) * np.cos(t), np.sin(p) * np.sin(t), np.cos(p)), axis=-1)
+    H = np.abs(qc.mean_curvature(qc.QuadGrid(x), scheme))
+    assert np.abs(H - 1).max() < 0.05
+
+
+def test_what_is_no_pole():
+    """A short side, single coincident points, a whole grid far away: all is left as it is."""
+    x = ball(24, 13, ends=(1e-4, 3.0))
+    assert poles(qc.QuadGrid(x, (True, False))) == []
+    x = ball(24, 13, ends=(0.3, 2.5))
+    x[3, 0] = x[4, 0]
+    assert poles(qc.QuadGrid(x, (True, False))) == []
+    assert poles(surfaces.torus().sample((8, 8))[0]) == []
+    plane = np.stack((*np.meshgrid(np.arange(5.0), np.arange(6.0), indexing="ij"), np.zeros((5, 6))), axis=-1)
+    assert poles(qc.QuadGrid(1e-8 * plane + 1e8)) == []
+
+
+@pytest.mark.parametrize("scheme", [name for name in ALL if name not in DIVERGENT])
+def test_staggered_grids_with_poles(scheme):
+    """The corners of the first and last cells are one point: these cells are triangles."""
+    n, m = 32, 16
+    t, p = np.linspace(0, 2 * np.pi, 2 * n + 1)[:, None], np.linspace(0, np.pi, 2 * m + 1)
+    x = np.stack(np.broadcast_arrays(np.sin(p) * np.cos(t), np.sin(p) * np.sin(t), np.cos(p)), axis=-1)
+    x[-1] = x[0]
+    grid = qc.StaggeredGrid(x[1::2, 1::2], x[::2, ::2], (True, False))
+    H = np.abs(qc.mean_curvature(grid, scheme))
+    assert np.abs(H[:, [0, -1]] - 1).max() < 0.05
