@@ -149,6 +149,16 @@ def test_layers_of_a_face_list_are_those_of_the_grid(shape, degree, layers, rng)
     assert np.count_nonzero(~whole.stencils().closed) == outermost - 4
 
 
+def test_strips_go_on_past_the_corners_of_a_hole():
+    """Only the lines that a hole cuts short have no ghosts of their own."""
+    points = quartic(*np.mgrid[:14, :12])
+    hidden = np.zeros((14, 12), bool)
+    hidden[4, 6] = True
+    treatment = boundary_treatment(QuadGrid(points, mask=hidden))[0]
+    assert (treatment[[5, 6, 7]] == FITTED).all()
+    assert (np.delete(treatment, [5, 6, 7]) == EXTRAPOLATED).all()
+
+
 @given(st.data())
 @settings(max_examples=60, derandomize=True, deadline=None)
 def test_ghosts_of_any_part_of_a_grid_continue_it(data):

@@ -20,7 +20,7 @@ NODES = 6  # of a line; the last one may be missing
 # does, or this part of what the one before does (the last but one does nothing where a line is odd); along
 # the normal, where noise of the surface shows, but for this part of all that the last but one does.
 SMOOTH, EARLIER, HIDDEN = 0.15, 0.002, 0.002
-ROUNDING = 2.0**-96  # of coordinates, squared, as extrapolation magnifies it
+_ROUNDING = 2.0**-95  # of coordinates, squared, as extrapolation magnifies it
 # Fourth-order schemes ask for more: the last point changes no more than this, squared, of what the changes of
 # the two points before it, as a geometric series, lead to expect.
 _EXPECTED = 9.0
@@ -54,6 +54,14 @@ def index_weights(degree: int, layer: int = 1) -> Floats:
     )
 
 
+def rounding_of(points: Floats) -> float:
+    """Square of what the rounding of points (..., 3) makes a sixth one change.
+
+    Of the farthest of them: a point near the origin may be a small difference of large numbers.
+    """
+    return _ROUNDING * float(np.square(points).sum(axis=-1).max(initial=0.0))
+
+
 @np.errstate(all="ignore")  # what overflows, or has no length, is NaN and has no ghosts
 def extended(lines: Floats, turn: Floats, degree: int, layers: int, beside: Indices) -> Continued:
     """Continue lines by ghosts.
@@ -75,7 +83,7 @@ def extended(lines: Floats, turn: Floats, degree: int, layers: int, beside: Indi
     x /= size[:, None]  # so that no power of lengths is too large or too small
     normal = np.cross(x[:, 1], _sideways(lines[:, 0], beside) / size)
     normal /= np.linalg.norm(normal, axis=1, keepdims=True)
-    rounding = ROUNDING * sum(_dot(far, far) for far in (lines[:, 0] / size, lines[:, 4] / size))
+    rounding = rounding_of(lines[:, ::4]) / size[:, 0] ** 2
     ends = _Ends(x[:, 1], normal, turn, rounding, beside)
     terms = np.stack([np.einsum("j,kjx->kx", w, x[:, : w.size]) for w in _DIFFERENCES])
     every = np.ones(len(lines), bool)

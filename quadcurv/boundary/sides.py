@@ -5,7 +5,15 @@ from __future__ import annotations
 import numpy as np
 import scipy
 
-from quadcurv.boundary.lines import EARLIER, HIDDEN, NODES, ROUNDING, SMOOTH, index_weights, without_excess
+from quadcurv.boundary.lines import (
+    EARLIER,
+    HIDDEN,
+    NODES,
+    SMOOTH,
+    index_weights,
+    rounding_of,
+    without_excess,
+)
 from quadcurv.mesh import QuadGrid, StaggeredGrid
 from quadcurv.stencils import Frame, Stencils
 from quadcurv.types import Bools, Floats, Indices, Ints, MeshError
@@ -115,7 +123,8 @@ def continued_side(points: Floats, axis: int, end: int, ghosts: Floats, wraps: b
     first = end * inward * (points.shape[axis] - 1)
     excess = np.empty(size)
     way = inward * (1 - 2 * end)
-    limits = SMOOTH, EARLIER, HIDDEN, ROUNDING
+    ends = np.moveaxis(points, axis, 0)[[-1, -5] if end else [0, 4]]
+    limits = SMOOTH, EARLIER, HIDDEN, rounding_of(ends)
     border.continue_side(points, first, along, way, wraps, limits, ghosts, excess)
     return without_excess(excess, _beside(size, wraps)) if excess.max() > 0 else None
 

@@ -1,9 +1,9 @@
 """Strips of quads inward from the border of a face list, and the quads of ghosts that continue them.
 
 The two sides of a strip run X_0, ..., X_5 straight through X_1, ..., X_4, which must be regular: four quads
-around, or two on the border; the sixth point may be missing for a quartic. At a corner, a border vertex of
-one quad, the ghosts of its two sides are extrapolated once more to the point across. A face list of a grid
-thus gets the ghosts of the grid.
+around, or on the border two, or three about the corner of a hole; the sixth point may be missing for a
+quartic. At a corner, a border vertex of one quad, the ghosts of its two sides are extrapolated once more to
+the point across. A face list of a grid thus gets the ghosts of the grid.
 """
 
 from __future__ import annotations
@@ -205,7 +205,8 @@ def _strips(mesh: Stencils, least: int) -> tuple[Indices, Indices, Indices, Indi
 
     indptr, corners = topology.corners_by_vertex(faces, n)
     valence = np.diff(indptr)
-    regular = valence == np.where(mesh.closed, 4, 2)
+    # On the border two quads, or three about the corner of a hole.
+    regular = np.where(mesh.closed, valence == 4, (valence == 2) | (valence == 3))
     regular[faces[faces[:, 3] < 0, :3]] = False
     kept &= faces[f, 3] >= 0
     f, i, j = f[kept], i[kept], j[kept]

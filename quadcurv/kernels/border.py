@@ -33,7 +33,7 @@ def continue_lines(
         line = [less(triple(points, at + inward * j, 1), x) for j in range(6)]
         ghost, third, fourth, fifth = zip(*map(continued, zip(*line, strict=True)), strict=True)
         place(ghosts, 3 * k, 1, plus(x, ghost))
-        a, last = line[1], plus(x, line[4])
+        a = line[1]
         edge = dot(a, a)
         normal = times(cross(a, apart(points, after, points, before, 1)), 1 / edge)
         behind, long_ago = smooth * dot(fourth, fourth), earlier * dot(third, third)
@@ -41,7 +41,7 @@ def continue_lines(
         q, r = smooth * (q * q), earlier * (r * r)
         up = (p * p - where(q > r, q, r)) / dot(normal, normal) - hidden * dot(fourth, fourth)
         over = dot(fifth, fifth) - where(behind > long_ago, behind, long_ago)
-        over = where(up > over, up, over) - rounding * (dot(x, x) + dot(last, last))
+        over = where(up > over, up, over) - rounding
         outside = (dot(ghost, a) < -0.2 * edge) & (dot(ghost, ghost) < 4.0 * edge) & (over == over)
         excess[k] = where(outside, over, inf)
 
@@ -66,7 +66,7 @@ def continue_side(points, first, along, inward, wraps, limits, ghosts, excess):
     wraps : bool
         Whether the first line is beside the last one.
     limits : (float, float, float, float)
-        SMOOTH, EARLIER, HIDDEN and ROUNDING of quadcurv.boundary.lines.
+        SMOOTH, EARLIER and HIDDEN of quadcurv.boundary.lines, and what is rounding, in squares of lengths.
     ghosts : (count, 3) float64
         Written to.
     excess : (count,) float64
