@@ -42,6 +42,7 @@ OBJ = {
     "plain": text(V, F),
     "byte order mark": MARK + text(V, F),
     "CR": text(V, F).replace(b"\n", b"\r"),
+    "UTF-16": text(V, F).decode().encode("utf-16"),
     "CR LF": text(V, F).replace(b"\n", b"\r\n"),
     "form feeds and separators in comments": text("# a\x0cb\x0bc\u2028d\u0085e", V, F),
     "faces over two lines": text(V, [line.replace(" ", " \\\n", 2) for line in F]),
@@ -117,6 +118,8 @@ OFF = {
     "comments and empty lines": text("# a", "OFF # b", "", COUNTS + "# 3", "", ROWS, "# c", QUADS),
     "byte order mark": MARK + text("OFF", COUNTS, ROWS, QUADS),
     "CR": text("OFF", COUNTS, ROWS, QUADS).replace(b"\n", b"\r"),
+    "UTF-16": text("OFF", COUNTS, ROWS, QUADS).decode().encode("utf-16"),
+    "small letters": text("off", COUNTS, ROWS, QUADS),
     "NOFF": text("NOFF", COUNTS, more(" 0 0 1"), QUADS),
     "COFF": text("COFF", COUNTS, more(" 255 0 0 255"), QUADS),
     "COFF of three": text("COFF", COUNTS, more(" 255 0 0"), QUADS),
@@ -218,7 +221,7 @@ def test_binary_ply_of_every_type_and_any_lists(tmp_path, order):
     codes |= {"uint64": "Q", "float": "f", "double": "d"}
     kind = {"<": "binary_little_endian", ">": "binary_big_endian"}[order]
     rng = np.random.default_rng(0)
-    for item in ("char", "ushort", "uint64", "int64"):
+    for item in ("char", "ushort", "uint64", "int64", "double"):
         for size in ("uchar", "short", "uint64"):
             head = ["element vertex 8", "property short w", *(f"property double {axis}" for axis in "xyz")]
             head += ["element face 6", "property float a", f"property list {size} {item} vertex_index"]

@@ -14,7 +14,7 @@ from quadcurv.io.text import Words, distinct, numbers, runs, text_of
 from quadcurv.mesh import QuadMesh
 from quadcurv.types import Indices, MeshError
 
-_HEADER = re.compile(rb"\s*((?:ST|C|N|4|n)*)OFF(?:\s+(BINARY)[^\n]*\n)?")
+_HEADER = re.compile(rb"\s*((?:ST|C|N|4|n)*)(?i:OFF)(?:\s+(BINARY)[^\n]*\n)?")
 
 
 def read_off(path: Path) -> Content:

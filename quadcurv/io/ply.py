@@ -231,7 +231,11 @@ def _faces(columns: dict[str, dict[str, Any]], header: Header) -> tuple[Any, Any
     for name in ("face", "tristrips"):
         if name not in header.elements or not columns[name]:
             continue
-        lists = [p.name for p in header.elements[name].properties if p.size and p.item not in "fd"]
+        lists = [
+            p.name
+            for p in header.elements[name].properties
+            if p.size and (p.item not in "fd" or p.name.lower() in CORNERS)
+        ]
         lists.sort(key=lambda key: key.lower() not in CORNERS)
         if not lists:
             raise KeyError("list of vertices")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import codecs
 import re
 from collections.abc import Iterator
 from pathlib import Path
@@ -18,7 +19,9 @@ _SPACE = 32  # and all control characters; those that are no white space end in 
 
 def text_of(path: Path) -> bytes:
     """The content of a file without a byte order mark and comments, all its lines ending in a line feed."""
-    text = path.read_bytes().removeprefix(b"\xef\xbb\xbf")
+    text = path.read_bytes().removeprefix(codecs.BOM_UTF8)
+    if text.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):  # as Windows' own tools save text
+        text = text.decode("utf-16", errors="replace").encode()
     if b"\r" in text:
         text = text.replace(b"\r\n", b"\n").replace(b"\r", b"\n")
     return re.sub(rb"#[^\n]*", b"", text) if b"#" in text else text
