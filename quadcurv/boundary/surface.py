@@ -146,9 +146,10 @@ def _fits(
         own, spread_out = _maps(x[at], inside[at])
         at, own = at[spread_out], own[spread_out]
         if at.size:
-            u = np.einsum("kab,kmb->kma", own, x[at, :, :2])
+            m = int(inside[at].sum(axis=1).max()) + 1  # the rings come one after the other
+            u = x[at, :m, :2] @ np.swapaxes(own, 1, 2)
             c, noise[at, d], gain[at, d], bend[at, d] = _fit(
-                u, x[at, :, 2], inside[at], ring[at] == 1, degree, own @ np.swapaxes(own, 1, 2)
+                u, x[at, :m, 2], inside[at, :m], ring[at, :m] == 1, degree, own @ np.swapaxes(own, 1, 2)
             )
             maps[at, d], coefficients[at, d] = own, np.pad(c, [(0, 0), (0, len(_TERMS) - terms)])
     return maps, coefficients, noise, gain, bend
@@ -184,9 +185,14 @@ def _steep(stencils: Stencils, normal: Floats, around: Ints, known: Bools) -> Bo
 
 def _terms(x: Floats, degree: int) -> Floats:
     """x^a y^b (..., terms) with 0 < a + b <= degree."""
-    powers = np.stack([x**e for e in range(degree + 1)])
-    terms = [powers[a, ..., 0] * powers[b, ..., 1] for a, b in _TERMS if a + b <= degree]
-    return np.stack(terms, axis=-1)
+    terms = np.empty((*x.shape[:-1], (degree + 1) * (degree + 2) // 2 - 1))
+    terms[..., :2] = x
+    for t, (a, b) in enumerate(
+        _TERMS[2 : terms.shape[-1]], 2
+    ):  # a coordinate times one of less degree
+        lower = (a - 1, b) if a else (a, b - 1)
+        np.multiply(terms[..., _TERMS.index(lower)], x[..., int(not a)], out=terms[..., t])
+    return terms
 
 
 def _fit(
@@ -198,21 +204,24 @@ def _fit(
     weight = np.where(inside, (1 - r / _SPREAD) ** 4 * (4 * r / _SPREAD + 1), 0.0)
     terms = _terms(np.where(inside[..., None], u, 0.0), degree)
     q, upper = np.linalg.qr(terms * weight[..., None])
-    singular = np.linalg.svd(upper, compute_uv=False)
-    well = singular[:, -1] * _CONDITION > singular[:, 0]
-    inverse = np.linalg.inv(np.where(well[:, None, None], upper, np.eye(upper.shape[-1])))
+    diagonal = np.abs(np.diagonal(upper, axis1=1, axis2=2))
+    regular = diagonal.min(axis=1) * _CONDITION > diagonal.max(axis=1)
+    inverse = np.linalg.inv(np.where(regular[:, None, None], upper, np.eye(upper.shape[-1])))
+    sizes = np.linalg.norm(upper, axis=(1, 2)), np.linalg.norm(inverse, axis=(1, 2))
+    well = regular & (sizes[0] * sizes[1] < _CONDITION)
     z = np.where(inside, z, 0.0)
-    from_heights = np.einsum("kts,kms,km->ktm", inverse, q, weight, optimize=True)
-    coefficients = np.einsum("ktm,km->kt", from_heights, z)
-    residual = weight * (z - np.einsum("kmt,kt->km", terms, coefficients))
+    from_heights = (inverse @ np.swapaxes(q, 1, 2)) * weight[:, None]
+    coefficients = (from_heights @ z[..., None])[..., 0]
+    residual = weight * (z - (terms @ coefficients[..., None])[..., 0])
     # The mean square of weighted residuals, for independent errors of one size.
-    free = (weight**2).sum(axis=1) - np.einsum("kmt,km->k", q**2, weight**2)
+    square = weight**2
+    free = square.sum(axis=1) - ((q * q).sum(axis=2) * square).sum(axis=1)
     noise = np.sqrt((residual**2).sum(axis=1) / np.maximum(free, np.finfo(float).tiny))
     beyond = _terms(np.where(first[..., None], -u, 0.0)[:, : first.sum(axis=1).max() + 1], degree)
     gain = np.sqrt(((beyond @ from_heights) ** 2).sum(axis=(1, 2)) / first.sum(axis=1))
     second = np.zeros((len(u), terms.shape[2]))
     for t, (a, b) in (((2, 0), (0, 0)), ((1, 1), (0, 1)), ((0, 2), (1, 1))):
         second[:, _TERMS.index(t)] = metric[:, a, b]
-    bend = np.linalg.norm(np.einsum("kt,ktm->km", second, from_heights), axis=1)
+    bend = np.linalg.norm(second[:, None] @ from_heights, axis=(1, 2))
     coefficients[~well] = noise[~well] = np.nan
     return coefficients, noise, gain, bend
