@@ -11,6 +11,7 @@ from scipy.spatial.transform import Rotation
 
 import quadcurv as qc
 from quadcurv import surfaces
+from quadcurv.kernels import vector
 from quadcurv.schemes import SCHEMES, Laplacian, cotan
 
 LAPLACIANS = {name: scheme for name, scheme in SCHEMES.items() if isinstance(scheme, Laplacian)}
@@ -177,6 +178,95 @@ def test_a_quad_without_area(scheme, scale, offset):
     corners = {(4, 4), (5, 4), (5, 5), (4, 5)}
     missing = set(zip(*np.nonzero(np.isnan(on_grid)), strict=True))
     assert missing == corners or (missing < corners and scheme.name == "cotan-4")
+
+
+def nan_by_path(mesh, scheme):
+    """Which vertices have no curvature: on the grid, its face list, one that begins elsewhere, by the law."""
+    by_law = replace(scheme, fast=None)
+    faces, rolled = mesh.to_mesh(), np.roll(mesh.to_mesh().faces, 1, axis=1)
+    found = [qc.mean_curvature(m, s, boundary="nan") for m in (mesh, faces) for s in (scheme, by_law)]
+    found.append(qc.mean_curvature((faces.points, rolled), scheme, boundary="nan"))
+    return [np.isnan(H.ravel()) for H in found]
+
+
+def place(points, rng):
+    """Points turned, of any size, near the origin or far from it."""
+    offset = rng.choice([0, 0, 1, 10, 1e3, 1e5]) * rng.normal(size=3)
+    return 10.0 ** rng.integers(-6, 7) * (points @ turn(rng.integers(1 << 30)) + offset)
+
+
+@pytest.mark.parametrize("scheme", [s for s in LAPLACIANS.values() if s.fast], ids=lambda s: s.name)
+@pytest.mark.parametrize("kind", ["line", "cap", "needle"])
+def test_all_paths_agree_on_quads_at_the_threshold(scheme, kind, rng):
+    """Quads whose area is within three parts in a hundred of what is taken for rounding."""
+    grid, missing = surfaces.torus().sample((12, 10))[0], 0
+    for seed in range(12):
+        away = rng.normal(size=3)
+
+        def points(size, seed=seed, away=away):
+            x = grid.points.copy()
+            if kind == "needle":
+                x[4, 4], x[5, 4] = x[4, 5] + size * away, x[5, 5] + size * away
+            else:
+                x[4, 4] = (2 * x[5, 4] + x[4, 5]) / 3 + size * away
+                part = 2 / 3 if kind == "line" else 0.4
+                x[5, 5] = x[4, 4] * (1 - part) + part * x[4, 5]
+            return place(x, np.random.default_rng(seed))
+
+        def square(x):
+            u, v = x[5, 5] - x[4, 4], x[4, 5] - x[5, 4]
+            middle = (x[4, 4] + x[5, 5] + x[4, 5] + x[5, 4]) / 4
+            return np.cross(u, v) @ np.cross(u, v) / vector.rounding(u @ u + v @ v, middle @ middle)
+
+        least, most = 1e-17, 1e-1
+        for _ in range(40):
+            between = np.sqrt(least * most)
+            least, most = (least, between) if square(points(between)) > 1 else (between, most)
+        paths = nan_by_path(qc.QuadGrid(points(most * rng.uniform(0.97, 1.03)), grid.wrap), scheme)
+        assert all(np.array_equal(path, paths[0]) for path in paths)
+        missing += paths[0].any()
+    assert 0 < missing < 12
+
+
+@pytest.mark.parametrize("scheme", [s for s in LAPLACIANS.values() if s.fast], ids=lambda s: s.name)
+def test_all_paths_agree_on_rings_at_the_threshold(scheme, rng):
+    """A fold whose rings have an area like rounding; cells of a staggered grid as flat."""
+    x, y = np.meshgrid(np.arange(-4.0, 5), np.arange(9.0), indexing="ij")
+    cells, missing = surfaces.torus().sample((10, 12), "staggered")[0], 0
+    for _ in range(20):
+        size = 10.0 ** rng.uniform(-15, -12)
+        fold = np.stack((np.abs(x), y, 0 * x), axis=-1) + size * rng.normal(size=(*x.shape, 3))
+        paths = nan_by_path(qc.QuadGrid(place(fold, rng)), scheme)
+        assert all(np.array_equal(path, paths[0]) for path in paths)
+        missing += np.count_nonzero(paths[0])
+        primal, dual = cells.primal.copy(), cells.dual.copy()
+        dual[5, 5:7] = primal[[5, 4], 5] + size * rng.normal(size=(2, 3))
+        both = place(np.concatenate((primal.reshape(-1, 3), dual.reshape(-1, 3))), rng)
+        one, other = np.split(both, [primal.size // 3])
+        moved = qc.StaggeredGrid(one.reshape(primal.shape), other.reshape(dual.shape), cells.wrap)
+        found = [np.isnan(qc.mean_curvature(moved, s)) for s in (scheme, replace(scheme, fast=None))]
+        assert np.array_equal(*found)
+    assert 0 < missing < 20 * 81
+
+
+@each_laplacian
+@pytest.mark.parametrize(
+    ("scale", "offset"), [(1.0, 0.0), (1e-6, 1e-6), (1e6, 1e6), (3.0, 3.0), (1.0, 100.0)]
+)
+def test_slivers_in_single_precision(scheme, scale, offset):
+    """What single precision makes of no area is no area: NaN there, and elsewhere no more than it costs."""
+    points, faces, h = plane_with_slivers(3, scale, offset)
+    points = points.astype(np.float32)
+    mesh = qc.QuadMesh(points, faces)
+    inside = np.flatnonzero(mesh.stencils().closed)
+    sliver = np.intersect1d(mesh.faces[mesh.faces[:, 3] < 0, :3], inside)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", qc.PrecisionWarning)
+        H = qc.mean_curvature(mesh, scheme)
+    if scheme.name != "finite_volume":
+        assert np.isnan(H[sliver]).all()
+    assert np.isfinite(H[np.setdiff1d(inside, sliver)]).all()
+    assert np.nanmax(np.abs(H)) < 10 * np.finfo(np.float32).eps * np.abs(points).max() / h**2
 
 
 @each_laplacian

@@ -2,7 +2,8 @@
 
 The fan of faces is completed by its mirror image through the vertex, in the tangent plane: as the other
 side of a regular vertex looks. Where that leaves a wide gap, edges are put between; ghosts lie on the
-fitted surface. A fan that leaves no room is not used: four quads on the surface take its place.
+fitted surface. A fan that leaves no room, or has a face of no width, is not used: four quads on the surface
+take its place.
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ from quadcurv.stencils import Stencils
 from quadcurv.types import Bools, Floats, Indices, Ints
 
 _NARROW = np.radians(10)  # a gap less than that leaves no room for a face
+_THIN = 1e-3  # an angle less than that, or less from straight, is a face of no width
 _BENT = 0.1  # how far a ghost quad may be from a parallelogram, in sums of its edges
 # Which edges of so many quads, or triangles, have mirror images that make them four, or six.
 _QUADS = {1: (1, 1), 2: (0, 1, 0), 3: (0, 0, 0, 0)}
@@ -83,7 +85,7 @@ def stars(stencils: Stencils, fan: Fans, surfaces: Surfaces) -> list[tuple[Indic
     angle = np.arctan2(edges[..., 1], edges[..., 0])
     corner = np.diff(angle, axis=1) % (2 * np.pi)
     total = corner.sum(axis=1)
-    sound = (corner < np.pi).all(axis=1) & (corner > 0).all(axis=1) & (total < 2 * np.pi - _NARROW)
+    sound = ((corner > _THIN) & (corner < np.pi - _THIN)).all(axis=1) & (total < 2 * np.pi - _NARROW)
     k, quads = corner.shape[1], fan.across >= 0
     gap = 2 * np.pi - total
     # Mirror images of the edges, by their angle from the last one, that stand free in the gap.

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Iterable, Mapping
 from typing import TypeGuard
 
@@ -20,6 +21,7 @@ __all__ = ["fit", "has_holes", "run", "stiffness"]
 # The quads of a staggered grid cover it twice, once for its cells and once for their corners: so that the
 # dual area of a cell is its area, matrix and areas are twice those of a mesh of these quads.
 _CELLS = 2.0
+_DOUBLE = 2.0**-53  # unit roundoff
 
 
 def fit(mesh: Mesh, scheme: Fit, boundary: str = "extrapolate") -> Curvatures:
@@ -50,7 +52,23 @@ def run(
         compiled.evaluate_grid(mesh, scheme, boundary, results)
     if isinstance(mesh, StaggeredGrid) and "dual_areas" in results:
         results["dual_areas"] *= _CELLS
+    if mesh.roundoff > _DOUBLE and not has_holes(mesh):
+        far = run(_far_away(mesh), scheme, results.keys() - {"dual_areas"}, boundary)
+        for name, values in far.items():
+            results[name][np.isnan(values)] = np.nan
     return results
+
+
+def _far_away(mesh: Mesh) -> Mesh:
+    """The mesh so far from the origin that its positions are rounded, in double precision, as those given.
+
+    What has no area but for rounding is then NaN by the same test as everywhere.
+    """
+    moved, arrays = copy.copy(mesh), mesh.arrays()
+    size = max(float(np.abs(x).max()) for x in arrays.values())
+    far = {name: x + size * mesh.roundoff / _DOUBLE for name, x in arrays.items()}
+    moved.__dict__.update(far, roundoff=_DOUBLE)
+    return moved
 
 
 def stiffness(

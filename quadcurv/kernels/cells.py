@@ -30,21 +30,48 @@ from quadcurv.kernels.rows import (
     unit_normals,
     vector_curvatures,
 )
-from quadcurv.kernels.vector import apart, cross, dot, known_square, less, place, plus, times, triple, unit
+from quadcurv.kernels.vector import (
+    cross,
+    dot,
+    known_ring_square,
+    known_square,
+    less,
+    middle,
+    place,
+    plus,
+    times,
+    triple,
+    unit,
+)
 
 # In `work`, `NORMAL`, `QUAD_SQUARE`, `LENGTH` are of the quads beside the points of row p. Those below them:
 BELOW, BELOW_LENGTH, BELOW_SQUARE = 18 * S, 21 * S, 22 * S
 ROOMS = (4 * ROW, ROW + Y, 23 * S)
 
 
+def corners_below(planes, p, q, b, i):
+    """Ends of the diagonals of the quad of the edge between rows p and q, across dual row b."""
+    return [triple(planes, k + i, Y) for k in (q, p, b + 1, b)]
+
+
+def corners_right(planes, p, a, b, i):
+    """Ends of those of the quad of the edge to the right in row p, from dual row b to a."""
+    return [triple(planes, k + i, Y) for k in (p + 1, p, a + 1, b + 1)]
+
+
 def below(planes, p, q, b, i):
-    """Diagonals of the quad of the edge between rows p and q, across dual row b."""
-    return apart(planes, q + i, planes, p + i, Y), apart(planes, b + i + 1, planes, b + i, Y)
+    """Diagonals of the quad of `corners_below`."""
+    return diagonals(corners_below(planes, p, q, b, i))
 
 
 def beside_right(planes, p, a, b, i):
-    """Diagonals of the quad of the edge to the right in row p, from dual row b to a."""
-    return apart(planes, p + i + 1, planes, p + i, Y), apart(planes, a + i + 1, planes, b + i + 1, Y)
+    """Diagonals of the quad of `corners_right`."""
+    return diagonals(corners_right(planes, p, a, b, i))
+
+
+def diagonals(corners):
+    """From the second corner to the first, from the fourth to the third."""
+    return less(corners[0], corners[1]), less(corners[2], corners[3])
 
 
 @formula
@@ -60,7 +87,7 @@ def first_fluxes(planes, p, q, b, part, width):
     for i in span(FIRST, FIRST + width):
         u, v = below(planes, p, q, b, i)
         n = cross(u, v)
-        n, part[i + ROW] = unit(n, known_square(n, u, v, triple(planes, p + i, Y)))
+        n, part[i + ROW] = unit(n, known_square(n, u, v, middle(*corners_below(planes, p, q, b, i))))
         place(part, i, Y, fluxes(u, v, n)[0])
 
 
@@ -69,7 +96,7 @@ def first_edge(planes, p, a, b, work):
     """The edge to the left of the first point of row p."""
     u, v = beside_right(planes, p, a, b, FIRST - 1)
     n = cross(u, v)
-    square = known_square(n, u, v, triple(planes, p + FIRST - 1, Y))
+    square = known_square(n, u, v, middle(*corners_right(planes, p, a, b, FIRST - 1)))
     n, work[FIRST - 1 + LENGTH] = unit(n, square)
     place(work, FIRST - 1 + NORMAL, S, n)
 
@@ -79,16 +106,18 @@ def edge_and_ring_normals(planes, p, q, a, b, work, g):
     """Normals of the quads below and beside row p, and of the rings around it."""
     for k in span(0, STRETCH):
         i, j = FIRST + g + k, FIRST + k
-        point = triple(planes, p + i, Y)
-        ring = apart(planes, b + i + 1, planes, a + i, Y), apart(planes, a + i + 1, planes, b + i, Y)
-        for normal, square, (u, v) in (
-            (BELOW, BELOW_SQUARE, below(planes, p, q, b, i)),
-            (NORMAL, QUAD_SQUARE, beside_right(planes, p, a, b, i)),
-            (RING, SQUARE, ring),
+        for normal, square, corners in (
+            (BELOW, BELOW_SQUARE, corners_below(planes, p, q, b, i)),
+            (NORMAL, QUAD_SQUARE, corners_right(planes, p, a, b, i)),
         ):
+            u, v = diagonals(corners)
             n = cross(u, v)
             place(work, j + normal, S, n)
-            work[j + square] = known_square(n, u, v, point)
+            work[j + square] = known_square(n, u, v, middle(*corners))
+        around = [triple(planes, k + i, Y) for k in (b + 1, a, a + 1, b)]
+        n = cross(*diagonals(around))
+        place(work, j + RING, S, n)
+        work[j + SQUARE] = known_ring_square(n, around, triple(planes, p + i, Y))
 
 
 @formula

@@ -4,7 +4,7 @@ import numpy as np
 
 from quadcurv.kernels.compiled import flat, kernel
 from quadcurv.kernels.formulas import formula, root
-from quadcurv.kernels.vector import apart, cross, dot, known_square, plus, times, triple, unless_zero
+from quadcurv.kernels.vector import apart, cross, dot, known_square, middle, plus, times, triple, unless_zero
 
 
 def add(sums, v, a):
@@ -24,7 +24,7 @@ def edge(points, a, b):
 
 
 def half_over_length(n, u, v, point):
-    """1 / (2 |n|) of n = u x v beside a point, NaN where n is zero but for rounding."""
+    """1 / (2 |n|) of n = u x v about a point, NaN where n is zero but for rounding."""
     return unless_zero(0.5 / root(dot(n, n)), known_square(n, u, v, point))
 
 
@@ -34,7 +34,7 @@ def add_quad(points, faces, f, flux, area):
     h, i, j, k = vertices(faces, f)
     u, v = edge(points, h, j), edge(points, i, k)
     n = cross(u, v)
-    scale = half_over_length(n, u, v, triple(points, 3 * h, 1))
+    scale = half_over_length(n, u, v, middle(*(triple(points, 3 * c, 1) for c in (h, j, i, k))))
     first, second = times(cross(v, n), scale), times(cross(n, u), scale)
     add(flux, h, first)
     add(flux, i, second)

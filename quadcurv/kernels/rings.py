@@ -20,8 +20,10 @@ from quadcurv.kernels.vector import (
     cross,
     dot,
     fused_cross,
+    known_ring_square,
     known_square,
     less,
+    middle,
     place,
     plus,
     times,
@@ -72,7 +74,8 @@ def corner_normals(x, work):
             v = less(around[corner - 3], around[corner])
             n, i = cross(u, v), corner * BLOCK + k
             place(work, i, CORNERS, n)
-            work[SQUARE + i] = known_square(n, u, v, c)
+            d = triple(x, edge(corner) + POINT + k, BLOCK)
+            work[SQUARE + i] = known_square(n, u, v, middle(c, d, around[corner], around[corner - 3]))
 
 
 @formula
@@ -90,7 +93,8 @@ def ring_normals(x, work):
     for k in span(0, BLOCK, 2):
         u, v = apart(x, edge(2) + k, x, edge(0) + k, BLOCK), apart(x, edge(3) + k, x, edge(1) + k, BLOCK)
         n = cross(u, v)
-        square = known_square(n, u, v, triple(x, k, BLOCK))
+        around = [triple(x, edge(corner) + k, BLOCK) for corner in range(4)]
+        square = known_ring_square(n, around, triple(x, k, BLOCK))
         work[SCALE + k] = scale = ring_scale(square)
         work[AREA + k] = ring_area(square)
         place(work, RING + k, BLOCK, times(n, scale))
@@ -195,10 +199,9 @@ def ring_curvatures(points, ring, far, liu, Hn, H, normal, area, start, stop):
 def corner_weights(x, work, corner, a, b):
     """`conductance` of one corner of every vertex of a block."""
     for k in span(0, BLOCK):
-        u, v = apart(x, a + POINT + k, x, k, BLOCK), apart(x, b + k, x, a + k, BLOCK)
-        work[OWN + corner * BLOCK + k], work[MIXED + corner * BLOCK + k] = conductance(
-            u, v, triple(x, k, BLOCK)
-        )
+        corners = [triple(x, i + k, BLOCK) for i in (0, a + POINT, a, b)]
+        u, v = less(corners[1], corners[0]), less(corners[3], corners[2])
+        work[OWN + corner * BLOCK + k], work[MIXED + corner * BLOCK + k] = conductance(u, v, middle(*corners))
 
 
 @formula

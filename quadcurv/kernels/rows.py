@@ -17,9 +17,11 @@ from quadcurv.kernels.vector import (
     apart,
     cross,
     dot,
+    known_ring_square,
     known_square,
     larger,
     less,
+    middle,
     most_rounding,
     place,
     plus,
@@ -97,6 +99,11 @@ def diagonals(planes, p, q, i):
     return apart(planes, q + i + 1, planes, p + i, Y), apart(planes, p + i + 1, planes, q + i, Y)
 
 
+def quad_middle(planes, p, q, i):
+    """Of the same quad."""
+    return middle(*(triple(planes, k, Y) for k in (p + i, q + i + 1, q + i, p + i + 1)))
+
+
 def ring_diagonals(planes, o, p, q, i):
     """Of the ring polygon around the vertex at i in row p."""
     return apart(planes, q + i, planes, o + i, Y), apart(planes, p + i + 1, planes, p + i - 1, Y)
@@ -107,7 +114,7 @@ def first_quad(planes, p, q, work):
     """The quad before the first one of a row."""
     u, v = diagonals(planes, p, q, FIRST - 1)
     n = cross(u, v)
-    square = known_square(n, u, v, triple(planes, p + FIRST - 1, Y))
+    square = known_square(n, u, v, quad_middle(planes, p, q, FIRST - 1))
     n, work[FIRST - 1 + LENGTH] = unit(n, square)
     place(work, FIRST - 1 + NORMAL, S, n)
 
@@ -173,11 +180,12 @@ def known_squares(planes, o, p, q, work, g, rings):
     """Make squares zero that are but for rounding, those of the rings too if they are there."""
     for k in span(0, STRETCH, 1):
         i, j = FIRST + g + k, FIRST + k
-        point = triple(planes, p + i, Y)
         normal, u, v = (triple(work, j + plane, S) for plane in (NORMAL, U, V))
-        work[j + QUAD_SQUARE] = known_square(normal, u, v, point)
-        a, b = ring_diagonals(planes, o, p, q, i)
-        work[j + SQUARE] = where(rings, known_square(cross(a, b), a, b, point), work[j + SQUARE])
+        work[j + QUAD_SQUARE] = known_square(normal, u, v, quad_middle(planes, p, q, i))
+        n = cross(*ring_diagonals(planes, o, p, q, i))
+        around = [triple(planes, k, Y) for k in (o + i, p + i - 1, q + i, p + i + 1)]
+        square = known_ring_square(n, around, triple(planes, p + i, Y))
+        work[j + SQUARE] = where(rings, square, work[j + SQUARE])
 
 
 @formula

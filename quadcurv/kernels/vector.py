@@ -87,15 +87,30 @@ def rounding(edges, far):
 def most_rounding(far):
     """`rounding` of whatever factors and points, `far` being the largest square of any point's coordinates.
 
-    A difference of two points has at most four times it, two of these at most eight.
+    A difference of two points has at most four times it, the eight of a ring at most 32 times.
     """
-    return rounding(8.1 * far, far)
+    return rounding(32.1 * far, far)
+
+
+def middle(a, b, c, d):
+    """Middle of the quad of the diagonals (a, b) and (c, d): the same wherever the quad begins."""
+    return times(plus(plus(a, b), plus(c, d)), 0.25)
 
 
 def known_square(n, u, v, point):
-    """Square of n = u x v beside a point, zero where n is but for rounding."""
+    """Square of n = u x v of a quad about a point, zero where n is but for rounding."""
     square = dot(n, n)
     return where(square > rounding(dot(u, u) + dot(v, v), dot(point, point)), square, 0.0)
+
+
+def known_ring_square(n, around, c):
+    """Square of n, the sum of the cross products of neighbours around c, zero where n is but for rounding.
+
+    Each neighbour is a factor of two of these products.
+    """
+    square, edges = dot(n, n), [less(a, c) for a in around]
+    one, two, three, four = [dot(edge, edge) for edge in edges]
+    return where(square > rounding(2.0 * ((one + two) + (three + four)), dot(c, c)), square, 0.0)
 
 
 def quotient(x, y):

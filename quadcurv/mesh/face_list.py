@@ -178,6 +178,10 @@ class QuadMesh:
         """Return the same mesh that knows how its quads were found."""
         return self._like(recovery=recovery)
 
+    def with_roundoff(self, roundoff: float) -> QuadMesh:
+        """Return the same mesh whose positions were given in another precision."""
+        return self._like(roundoff=roundoff)
+
     def flat(self, values: NDArray[Any]) -> NDArray[Any]:
         """Return values in the shape of results as (n, ...): what :meth:`in_shape` takes."""
         return values

@@ -149,11 +149,12 @@ class QuadGrid:
         """Return the same quads as a face list, vertices in row-major order, masked ones left out."""
         if self.mask is None:
             stencils = self.stencils()
-            return QuadMesh(stencils.points, stencils.faces)
+            return QuadMesh(stencils.points, stencils.faces).with_roundoff(self.roundoff)
         index = np.full(self.shape, -1, np.int32)
         index[~self.mask] = np.arange(np.count_nonzero(~self.mask))
         faces = grid_faces(np.pad(index, [(0, int(w)) for w in self.wrap], mode="wrap"))
-        return QuadMesh(self.points[~self.mask], faces[(faces >= 0).all(axis=1)])
+        mesh = QuadMesh(self.points[~self.mask], faces[(faces >= 0).all(axis=1)])
+        return mesh.with_roundoff(self.roundoff)
 
 
 def _refuse_repetition(points: Floats, axis: int, name: str) -> None:

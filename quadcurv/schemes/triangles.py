@@ -73,8 +73,12 @@ def voronoi(weights: Floats, double: Floats) -> Floats:
 
 
 def squared_distance(x: Floats) -> Floats:
-    """Squared distance from the origin (m,) of faces (m, k, 3): it says how far their corners are rounded."""
-    return np.einsum("mx,mx->m", x[:, 0], x[:, 0])
+    """Squared distance from the origin (m,) of faces (m, k, 3): it says how far their corners are rounded.
+
+    Of their middle, which is the same wherever they begin.
+    """
+    middle = x.mean(axis=1)
+    return np.einsum("mx,mx->m", middle, middle)
 
 
 def length(product: Floats, edges: Floats, far: Floats) -> Floats:
