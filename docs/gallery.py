@@ -10,6 +10,7 @@ ORDER = (
     "cubed_sphere",
     "terrain_with_holes",
     "cad_fillet",
+    "blocks_that_meet",
     "subdivision_surface",
     "minimal_surfaces",
     "one_operator_two_areas",

@@ -24,6 +24,7 @@ from .io import to_pyvista as to_pyvista
 from .io import to_trimesh as to_trimesh
 from .io import write as write
 from .kernels.ranges import set_threads as set_threads
+from .mesh import GridBlocks as GridBlocks
 from .mesh import QuadGrid as QuadGrid
 from .mesh import QuadMesh as QuadMesh
 from .mesh import StaggeredGrid as StaggeredGrid

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 from quadcurv import drivers
 from quadcurv.boundary import one_rings
 from quadcurv.io import as_mesh
-from quadcurv.mesh import Mesh, StaggeredGrid
+from quadcurv.mesh import GridBlocks, Mesh, StaggeredGrid
 from quadcurv.precision import warn_of_rounding
 from quadcurv.schemes import Curvatures, Fit, Laplacian, Scheme, SchemeName, as_scheme
 from quadcurv.schemes.angle_defect import angle_defect
@@ -50,7 +50,7 @@ def curvatures(
     Parameters
     ----------
     mesh : QuadMesh, QuadGrid, StaggeredGrid, trimesh.Trimesh, pyvista.PolyData, path or (points, faces)
-        See :func:`quadcurv.as_mesh`.
+        See :func:`quadcurv.as_mesh`; or GridBlocks, for which results are tuples, one a block.
     scheme : str or Fit
         A fit: "jet" and its kin.
     boundary : {"extrapolate", "nan"}
@@ -78,7 +78,7 @@ def curvatures(
     >>> bool(np.abs(found.k1 - 0.5).max() < 5e-3)
     True
     """
-    return _fitted(as_mesh(mesh), _as_fit(scheme), boundary)
+    return _split(mesh, _fitted(_taken(mesh), _as_fit(scheme), boundary))
 
 
 def principal_curvatures(
@@ -109,8 +109,10 @@ def principal_curvatures(
     >>> bool(np.abs(k1 - 1).max() < 5e-3 and np.abs(k2).max() < 5e-3)
     True
     """
-    found = curvatures(mesh, scheme, boundary)
-    return PrincipalCurvatures(found.k1, found.k2, found.direction1, found.direction2)
+    found = _fitted(_taken(mesh), _as_fit(scheme), boundary)
+    return PrincipalCurvatures(
+        *(_split(mesh, x) for x in (found.k1, found.k2, found.direction1, found.direction2))
+    )
 
 
 def mean_curvature(
@@ -121,7 +123,7 @@ def mean_curvature(
     Parameters
     ----------
     mesh : QuadMesh, QuadGrid, StaggeredGrid, trimesh.Trimesh, pyvista.PolyData, path or (points, faces)
-        See :func:`quadcurv.as_mesh`.
+        See :func:`quadcurv.as_mesh`; or GridBlocks, for which results are tuples, one array a block.
     scheme : str or Scheme
         A name in ``quadcurv.schemes.SCHEMES``, or one of :mod:`quadcurv.schemes`. The default is the one a
         user should take without reading; "finite_volume" is the thesis's.
@@ -159,12 +161,12 @@ def mean_curvature(
     >>> bool(np.abs(qc.mean_curvature(ball) - 0.5).max() < 5e-3)
     True
     """
-    mesh, chosen = as_mesh(mesh), as_scheme(scheme)
+    mesh, chosen = _taken(mesh), as_scheme(scheme)
     if isinstance(chosen, Fit):
-        return _fitted(mesh, chosen, boundary).mean
+        return _split(mesh, _fitted(mesh, chosen, boundary).mean)
     H = drivers.run(mesh, chosen, ["mean_curvature"], boundary)["mean_curvature"]
     warn_of_rounding(mesh, H)
-    return H
+    return _split(mesh, H)
 
 
 def mean_curvature_normal(
@@ -196,13 +198,13 @@ def mean_curvature_normal(
     >>> bool((np.einsum("ijx,ijx->ij", Hn, ball.points) < 0).all())
     True
     """
-    mesh, chosen = as_mesh(mesh), as_scheme(scheme)
+    mesh, chosen = _taken(mesh), as_scheme(scheme)
     if isinstance(chosen, Fit):
         fits = _fitted(mesh, chosen, boundary)
-        return -fits.mean[..., None] * fits.normal
+        return _split(mesh, -fits.mean[..., None] * fits.normal)
     Hn = drivers.run(mesh, chosen, ["mean_curvature_normal"], boundary)["mean_curvature_normal"]
     warn_of_rounding(mesh, Hn)
-    return Hn
+    return _split(mesh, Hn)
 
 
 def gaussian_curvature(
@@ -236,15 +238,15 @@ def gaussian_curvature(
     >>> bool(np.abs(qc.gaussian_curvature(ball) - 0.25).max() < 5e-3)
     True
     """
-    mesh = as_mesh(mesh)
+    mesh = _taken(mesh)
     if not (isinstance(scheme, str) and scheme == "angle_defect"):
-        return _fitted(mesh, _as_fit(scheme), boundary).gaussian
-    stencils = one_rings(mesh, boundary)
+        return _split(mesh, _fitted(mesh, _as_fit(scheme), boundary).gaussian)
+    stencils = one_rings(mesh.mesh if isinstance(mesh, GridBlocks) else mesh, boundary)
     defect, area = angle_defect(stencils)
     with np.errstate(divide="ignore", invalid="ignore"):
         K = defect / area
     K[~stencils.closed | ~np.isfinite(K)] = np.nan
-    return mesh.in_shape(K)
+    return _split(mesh, K[: mesh.n] if isinstance(mesh, GridBlocks) else mesh.in_shape(K))
 
 
 def vertex_normals(mesh: Any, boundary: str = "extrapolate") -> Floats:
@@ -328,7 +330,8 @@ def stiffness_matrix(
         where there are triangles. On quads the finite-volume and Liu's matrix (they are the same) do not
         see a checkerboard: where vertices can be coloured like a chessboard, the alternating mode lies in
         the null space beside the constants. The bilinear element has no such mode.
-        Of a staggered grid (n, p): rows are the n cells, columns the p points of ``stencils().points``.
+        Of GridBlocks rows and columns are numbered by their ``numbers``. Of cells (n, p): rows are the n
+        cells, columns the p points of ``stencils().points``.
 
     Raises
     ------
@@ -343,7 +346,7 @@ def stiffness_matrix(
     >>> bool(np.abs(S.sum(axis=1)).max() < 1e-12)
     True
     """
-    return drivers.stiffness(as_mesh(mesh), _as_laplacian(scheme), out)
+    return drivers.stiffness(_taken(mesh), _as_laplacian(scheme), out)
 
 
 def mass_matrix(mesh: Any, scheme: SchemeName | str | Scheme = DEFAULT_MATRIX) -> scipy.sparse.dia_array:
@@ -370,7 +373,7 @@ def mass_matrix(mesh: Any, scheme: SchemeName | str | Scheme = DEFAULT_MATRIX) -
     >>> qc.mass_matrix(ball).shape
     (386, 386)
     """
-    mesh = as_mesh(mesh)
+    mesh = _taken(mesh)
     return scipy.sparse.diags_array(mesh.flat(dual_areas(mesh, scheme)))
 
 
@@ -383,7 +386,8 @@ def laplace_beltrami(mesh: Any, f: ArrayLike, scheme: SchemeName | str | Scheme 
         As for :func:`mean_curvature`, but of a Laplacian.
     f : (n,) or (n, k) array_like
         One or several functions; of a grid (r, c) or (r, c, k). Of a staggered grid (p,) or (p, k), at
-        the p points of ``stencils().points``: the cells, then the other points.
+        the p points of ``stencils().points``: the cells, then the other points. Of blocks of vertices one
+        array a block, which agree where these meet.
 
     Returns
     -------
@@ -409,9 +413,9 @@ def laplace_beltrami(mesh: Any, f: ArrayLike, scheme: SchemeName | str | Scheme 
     >>> bool(np.abs(found + 2 * ball.points).mean() < 0.01)
     True
     """
-    mesh, chosen = as_mesh(mesh), _as_laplacian(scheme)
+    mesh, chosen = _taken(mesh), _as_laplacian(scheme)
     stencils = mesh.stencils()
-    given = np.asarray(f)
+    given = mesh.joined(f) if isinstance(mesh, GridBlocks) and not mesh.of_cells else np.asarray(f)
     if given.dtype.kind not in "biuf":
         raise ValueError(f"f: expected real numbers, got dtype {given.dtype}")
     given = given.astype(np.float64, copy=False)
@@ -419,7 +423,7 @@ def laplace_beltrami(mesh: Any, f: ArrayLike, scheme: SchemeName | str | Scheme 
         if given.shape[:2] != mesh.shape:
             raise ValueError(f"f: shape {given.shape}, expected {mesh.shape} or {(*mesh.shape, 'k')}")
         return mesh.in_shape(laplace_beltrami(mesh.to_mesh(), mesh.flat(given), chosen))
-    lead = (len(stencils.points),) if isinstance(mesh, StaggeredGrid) else stencils.shape
+    lead = (len(stencils.points),) if isinstance(mesh, StaggeredGrid | GridBlocks) else stencils.shape
     if given.shape[: len(lead)] != lead or given.ndim > len(lead) + 1:
         raise ValueError(f"f: shape {given.shape}, expected {lead} or {(*lead, 'k')}")
     values = given.reshape(len(stencils.points), *given.shape[len(lead) :])
@@ -429,7 +433,7 @@ def laplace_beltrami(mesh: Any, f: ArrayLike, scheme: SchemeName | str | Scheme 
         result /= -areas.reshape(-1, *[1] * (values.ndim - 1))
     result[~stencils.closed] = np.nan
     result[~np.isfinite(result)] = np.nan
-    return result.reshape(*stencils.shape, *values.shape[1:])
+    return _split(mesh, result.reshape(*stencils.shape, *values.shape[1:]))
 
 
 def evaluate(
@@ -470,10 +474,29 @@ def evaluate(
     >>> sorted(qc.evaluate(ball, "mean_curvature", "dual_areas"))
     ['dual_areas', 'mean_curvature']
     """
-    return drivers.run(as_mesh(mesh), _as_laplacian(scheme), wanted, boundary, out)
+    mesh = _taken(mesh)
+    found = drivers.run(mesh, _as_laplacian(scheme), wanted, boundary, out)
+    return {name: _split(mesh, values) for name, values in found.items()}
 
 
-def _fitted(mesh: Mesh, scheme: Fit, boundary: str) -> Curvatures:
+def _taken(mesh: Any) -> Any:
+    """What a verb is asked of, as the drivers take it."""
+    return mesh if isinstance(mesh, GridBlocks) else as_mesh(mesh)
+
+
+def _split(mesh: Any, values: Any) -> Any:
+    """Results as a verb gives them: of blocks (n, ...) as one array, or Curvatures, a block."""
+    if not isinstance(mesh, GridBlocks):
+        return values
+    if not isinstance(values, Curvatures):
+        return mesh.split(values)
+    return tuple(
+        drivers.each(values, lambda x, k=k: mesh.split(x)[k])  # type: ignore[misc]
+        for k in range(len(mesh))
+    )
+
+
+def _fitted(mesh: Mesh | GridBlocks, scheme: Fit, boundary: str) -> Curvatures:
     found = drivers.fit(mesh, scheme, boundary)
     warn_of_rounding(mesh, found.mean)
     return found

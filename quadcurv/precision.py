@@ -6,19 +6,19 @@ import warnings
 
 import numpy as np
 
-from quadcurv.mesh import Mesh, QuadGrid, QuadMesh
+from quadcurv.mesh import GridBlocks, Mesh, QuadGrid, QuadMesh
 from quadcurv.types import Floats, PrecisionWarning
 
 _SAMPLE = 512  # of the edges, whose lengths are looked at
 _NOTED = 0.01  # of the mean curvature
 
 
-def rounding_error(mesh: Mesh) -> tuple[float, float]:
+def rounding_error(mesh: Mesh | GridBlocks) -> tuple[float, float]:
     """Error of H that the rounding of positions causes, about, and the extent of the mesh.
 
     Parameters
     ----------
-    mesh : QuadMesh, QuadGrid or StaggeredGrid
+    mesh : QuadMesh, QuadGrid, StaggeredGrid or GridBlocks
 
     Returns
     -------
@@ -44,7 +44,7 @@ def rounding_error(mesh: Mesh) -> tuple[float, float]:
     return float(2 * mesh.roundoff * max(-low.min(), high.max()) / h2), float((high - low).max())
 
 
-def warn_of_rounding(mesh: Mesh, H: Floats) -> None:
+def warn_of_rounding(mesh: Mesh | GridBlocks, H: Floats) -> None:
     """Warn where rounding reaches a hundredth of the mean curvature, or of 1 / extent where that is larger.
 
     Warns
@@ -67,8 +67,11 @@ def warn_of_rounding(mesh: Mesh, H: Floats) -> None:
         )
 
 
-def _edges(mesh: Mesh) -> tuple[Floats, Floats]:
+def _edges(mesh: Mesh | GridBlocks) -> tuple[Floats, Floats]:
     """Ends (k, 3) of some edges."""
+    if isinstance(mesh, GridBlocks):
+        begin, end = zip(*map(_edges, mesh), strict=True)
+        return np.concatenate(begin), np.concatenate(end)
     if isinstance(mesh, QuadMesh):
         faces = mesh.faces[:: len(mesh.faces) // _SAMPLE + 1]
         return mesh.points[faces[:, [0, 1]].ravel()], mesh.points[faces[:, [1, 2]].ravel()]

@@ -23,7 +23,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from quadcurv.boundary.cells import cells_at_poles, closed_cells
+from quadcurv.boundary.cells import cell_ghosts, cells_at_poles, cells_within, closed_cells
 from quadcurv.boundary.closing import EXTRAPOLATED, FITTED, INTERIOR, OPEN, REACH, closed
 from quadcurv.boundary.mirror import mirrored
 from quadcurv.boundary.poles import closed_grid, parts_at_poles, poles, welded
@@ -43,9 +43,12 @@ __all__ = [
     "OPEN",
     "REACH",
     "boundary_treatment",
+    "cell_ghosts",
     "cells_at_poles",
+    "cells_within",
     "checked_boundary",
     "closed",
+    "closed_cells",
     "fitted",
     "frame",
     "ghost_layer",

@@ -19,18 +19,14 @@ from quadcurv.stencils import Stencils
 from quadcurv.types import Bools, Floats, Indices
 
 
-def closed_cells(grid: StaggeredGrid) -> tuple[Stencils, NDArray[np.uint8]]:
-    """Stencils with closed rings, and what closes each."""
-    centres, rough = _cell_ghosts(grid)
-    r, c = grid.shape
-    index = np.full((r + 2, c + 2), -1, np.int32)
-    index[1:-1, 1:-1] = np.arange(r * c).reshape(r, c)
-    for axis in (0, 1):
-        if grid.wrap[axis]:
-            np.moveaxis(index, axis, 0)[[0, -1]] = np.moveaxis(index, axis, 0)[[-2, 1]]
-    known = (index < 0) & np.isfinite(centres).all(axis=2)
-    index[known] = np.arange(r * c, r * c + np.count_nonzero(known))
-    given, treated = grid.stencils(), grid.diamonds(index, centres[known])
+def closed_cells(grid: StaggeredGrid, beyond: Floats | None = None) -> tuple[Stencils, NDArray[np.uint8]]:
+    """Stencils with closed rings, and what closes each.
+
+    `beyond` (r + 2, c + 2, 3) has around it the centres of cells that are known, other grids', else NaN.
+    """
+    centres, rough = cell_ghosts(grid, beyond)
+    given = grid.stencils() if beyond is None else cells_within(grid, beyond)
+    treated = cells_within(grid, centres)
     closes = np.where(rough.ravel(), FITTED, EXTRAPOLATED)
     treatment = np.where(given.closed, INTERIOR, np.where(treated.closed, closes, OPEN))
     at_pole = cells_at_poles(grid)
@@ -44,6 +40,19 @@ def closed_cells(grid: StaggeredGrid) -> tuple[Stencils, NDArray[np.uint8]]:
     return treated, treatment.astype(np.uint8)
 
 
+def cells_within(grid: StaggeredGrid, centres: Floats) -> Stencils:
+    """Stencils of a grid among those cells of the rim of (r + 2, c + 2, 3) centres that are not NaN."""
+    r, c = grid.shape
+    index = np.full((r + 2, c + 2), -1, np.int32)
+    index[1:-1, 1:-1] = np.arange(r * c).reshape(r, c)
+    for axis in (0, 1):
+        if grid.wrap[axis]:
+            np.moveaxis(index, axis, 0)[[0, -1]] = np.moveaxis(index, axis, 0)[[-2, 1]]
+    known = (index < 0) & np.isfinite(centres).all(axis=2)
+    index[known] = np.arange(r * c, r * c + np.count_nonzero(known))
+    return grid.diamonds(index, centres[known])
+
+
 def cells_at_poles(grid: StaggeredGrid) -> Indices:
     """Cells, flat, with a side that is one point."""
     beside = np.zeros(grid.shape, bool)
@@ -53,11 +62,11 @@ def cells_at_poles(grid: StaggeredGrid) -> Indices:
 
 
 @np.errstate(all="ignore")
-def _cell_ghosts(grid: StaggeredGrid) -> tuple[Floats, Bools]:
+def cell_ghosts(grid: StaggeredGrid, known: Floats | None = None) -> tuple[Floats, Bools]:
     """Centres of ghost cells around a staggered grid, (r + 2, c + 2, 3) with its own in the middle.
 
-    By index where the centres are even, else on a surface fitted at the centre beside; NaN where nothing is
-    known. Second, which (r, c) have one of the last kind.
+    Those of `known` that are not NaN, else by index where the centres are even, else on a surface fitted at
+    the centre beside; NaN where nothing is known. Second, which (r, c) have one of the last kind.
     """
     r, c = grid.shape
     x = np.pad(grid.primal, [(1, 1), (1, 1), (0, 0)], constant_values=np.nan)
@@ -67,9 +76,13 @@ def _cell_ghosts(grid: StaggeredGrid) -> tuple[Floats, Bools]:
         if grid.wrap[axis]:
             beyond[[0, -1], 1:-1] = inner[[-1, 0]]
             continue
+        others = None if known is None else np.moveaxis(known, axis, 0)
         dual = np.moveaxis(grid.dual, axis, 0)
         number = np.moveaxis(np.arange(r * c).reshape(r, c), axis, 0)
         for end, next_, far in ((0, 1, 1), (-1, -2, -2)):
+            if others is not None and np.isfinite(others[end, 1:-1]).any():  # a side meets another as a whole
+                beyond[end, 1:-1] = others[end, 1:-1]
+                continue
             ghosts = np.empty((size, 3))
             even = continued_side(grid.primal, axis, -end, ghosts, grid.wrap[1 - axis])
             at = np.empty(0, int) if even is None else np.flatnonzero(~even)

@@ -10,12 +10,14 @@ import numpy as np
 import scipy
 
 from quadcurv.boundary import checked_boundary, one_rings
-from quadcurv.drivers import compiled, direct, fits
-from quadcurv.mesh import Mesh, QuadGrid, QuadMesh, StaggeredGrid
+from quadcurv.drivers import blocks, compiled, direct, fits
+from quadcurv.drivers.fits import each
+from quadcurv.mesh import GridBlocks, Mesh, QuadGrid, QuadMesh, StaggeredGrid
 from quadcurv.schemes import Curvatures, Fit, Laplacian
+from quadcurv.stencils import Stencils
 from quadcurv.types import Floats
 
-__all__ = ["fit", "has_holes", "run", "stiffness"]
+__all__ = ["each", "fit", "has_holes", "run", "stiffness"]
 
 
 # The quads of a staggered grid cover it twice, once for its cells and once for their corners: so that the
@@ -24,15 +26,17 @@ _CELLS = 2.0
 _DOUBLE = 2.0**-53  # unit roundoff
 
 
-def fit(mesh: Mesh, scheme: Fit, boundary: str = "extrapolate") -> Curvatures:
-    """Curvatures by a fit at every vertex of a mesh, in the shape of its results."""
+def fit(mesh: Mesh | GridBlocks, scheme: Fit, boundary: str = "extrapolate") -> Curvatures:
+    """Curvatures by a fit at every vertex of a mesh, in the shape of its results; of blocks (n,)."""
+    if isinstance(mesh, GridBlocks):
+        return each(fits.fit(mesh.mesh, scheme, boundary), lambda values: values[: mesh.n])
     if has_holes(mesh):
-        return fits.each(fits.fit(mesh.to_mesh(), scheme, boundary), mesh.in_shape)
+        return each(fits.fit(mesh.to_mesh(), scheme, boundary), mesh.in_shape)
     return fits.fit(mesh, scheme, boundary)
 
 
 def run(
-    mesh: Mesh,
+    mesh: Mesh | GridBlocks,
     scheme: Laplacian,
     wanted: Iterable[str],
     boundary: str = "extrapolate",
@@ -41,7 +45,9 @@ def run(
     """Results by name (see `direct.PER_VERTEX`), into the arrays of `out` where there are any."""
     checked_boundary(boundary)
     results = _arrays(mesh, wanted, {} if out is None else out)
-    if has_holes(mesh):
+    if isinstance(mesh, GridBlocks):
+        blocks.evaluate(mesh, scheme, boundary, results)
+    elif has_holes(mesh):
         for name, values in run(mesh.to_mesh(), scheme, results, boundary).items():
             results[name][...] = mesh.in_shape(values)
     elif scheme.fast is None:
@@ -50,7 +56,7 @@ def run(
         compiled.evaluate_faces(mesh, scheme, boundary, results)
     else:
         compiled.evaluate_grid(mesh, scheme, boundary, results)
-    if isinstance(mesh, StaggeredGrid) and "dual_areas" in results:
+    if _of_cells(mesh) and "dual_areas" in results:
         results["dual_areas"] *= _CELLS
     if mesh.roundoff > _DOUBLE and not has_holes(mesh):
         far = run(_far_away(mesh), scheme, results.keys() - {"dual_areas"}, boundary)
@@ -72,29 +78,41 @@ def _far_away(mesh: Mesh) -> Mesh:
 
 
 def stiffness(
-    mesh: Mesh, scheme: Laplacian, out: scipy.sparse.csr_array | None = None
+    mesh: Mesh | GridBlocks, scheme: Laplacian, out: scipy.sparse.csr_array | None = None
 ) -> scipy.sparse.csr_array:
     """Stiffness matrix without ghosts, NaN wherever it is not finite; `out` is for the fast schemes."""
-    if scheme.fast is not None:
-        matrix = compiled.stiffness(mesh.stencils(), scheme, out)
-    elif out is not None:
+
+    def assembled(stencils: Stencils) -> scipy.sparse.csr_array:
+        if scheme.fast is not None:
+            return compiled.stiffness(stencils, scheme, out)
+        return direct.without_infinity(scheme.assemble(stencils)[0])
+
+    if out is not None and (scheme.fast is None or (isinstance(mesh, GridBlocks) and mesh.of_cells)):
         raise ValueError(f"out: {scheme.name} assembles a new matrix each time")
+    if isinstance(mesh, GridBlocks) and mesh.of_cells:
+        matrix = blocks.stiffness_of_cells(mesh, assembled)
     else:
-        matrix = direct.without_infinity(scheme.assemble(mesh.stencils())[0])
-    if isinstance(mesh, StaggeredGrid):
+        matrix = assembled(mesh.stencils())
+    if _of_cells(mesh):
         matrix.data *= _CELLS
     return matrix
 
 
-def has_holes(mesh: Mesh) -> TypeGuard[QuadGrid]:
+def _of_cells(mesh: Mesh | GridBlocks) -> bool:
+    return isinstance(mesh, StaggeredGrid) or (isinstance(mesh, GridBlocks) and mesh.of_cells)
+
+
+def has_holes(mesh: Mesh | GridBlocks) -> TypeGuard[QuadGrid]:
     """Whether points of a grid are masked: it is computed as a face list then."""
     return isinstance(mesh, QuadGrid) and mesh.mask is not None
 
 
-def _arrays(mesh: Mesh, wanted: Iterable[str], out: Mapping[str, Floats]) -> dict[str, Floats]:
+def _arrays(mesh: Mesh | GridBlocks, wanted: Iterable[str], out: Mapping[str, Floats]) -> dict[str, Floats]:
     """The caller's arrays, which kernels will write to without looking again, or new ones."""
     if not isinstance(out, Mapping):
         raise ValueError(f"out: expected a mapping from names to arrays, got {type(out).__name__}")
+    if isinstance(mesh, GridBlocks) and out:
+        raise ValueError("out: blocks have an array each, which are new ones")
     shape = (len(mesh.points),) if isinstance(mesh, QuadMesh) else mesh.shape
     results: dict[str, Floats] = {}
     for name in dict.fromkeys((*wanted, *out)):
@@ -112,7 +130,8 @@ def _arrays(mesh: Mesh, wanted: Iterable[str], out: Mapping[str, Floats]) -> dic
             or not (array.flags.c_contiguous and array.flags.writeable)
         ):
             raise ValueError(f"out: {name} wants a writeable C-contiguous float64 ndarray of shape {full}")
-        for other, taken in (*mesh.arrays().items(), *results.items()):
+        given = {} if isinstance(mesh, GridBlocks) else mesh.arrays()
+        for other, taken in (*given.items(), *results.items()):
             if np.may_share_memory(array, taken):
                 raise ValueError(f"out: {name} overlaps the memory of {other}")
         results[name] = array

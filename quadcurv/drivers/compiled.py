@@ -43,7 +43,7 @@ def evaluate_grid(
 ) -> None:
     """All in one pass, save along open sides: what is cut off there, and rings that ghosts by index miss."""
     assert scheme.fast is not None
-    unserved = _evaluate_rows(grid, scheme.fast, boundary, results)
+    unserved = evaluate_rows(grid, scheme.fast, boundary, results)
     if all(grid.wrap) or (isinstance(grid, StaggeredGrid) and grid.has_ghosts):
         return
     if isinstance(grid, QuadGrid):
@@ -99,10 +99,17 @@ def _evaluate_sides(grid: QuadGrid | StaggeredGrid, scheme: Laplacian, results: 
                 np.moveaxis(results[name], axis, 0)[end] = np.moveaxis(values, axis, 0)[end]
 
 
-def _evaluate_rows(
-    grid: QuadGrid | StaggeredGrid, diamond_of: Diamond, boundary: str, results: Mapping[str, Floats]
+def evaluate_rows(
+    grid: QuadGrid | StaggeredGrid,
+    diamond_of: Diamond,
+    boundary: str,
+    results: Mapping[str, Floats],
+    around: Frame | None = None,
 ) -> Indices:
-    """Run a pass over a grid; the border vertices that its frame does not serve."""
+    """Run a pass over a grid; the border vertices that its frame does not serve.
+
+    Of cells the frame may be known: other grids' cells.
+    """
     from quadcurv.kernels import cells, ranges, rows
     from quadcurv.kernels.compiled import flat
 
@@ -119,7 +126,9 @@ def _evaluate_rows(
                 dual = dual.copy()
                 np.moveaxis(dual, axis, 0)[-1] = first
         points, size, unserved = flat(grid.primal), 3 * c, np.empty(0, np.int64)
-        if grid.has_ghosts:
+        if around is not None:
+            pass
+        elif grid.has_ghosts:
             sides, size = grid.primal, 3 * (c + 2)
             around = Frame(sides[[0, -1], 1:-1], np.moveaxis(sides[:, [0, -1]], 1, 0))
             points = points[size + 3 :]

@@ -17,7 +17,7 @@ from quadcurv.io.base import FORMATS, Content, checked_values, joined, library, 
 from quadcurv.io.quads import quads_by_order
 from quadcurv.io.replacing import replacing
 from quadcurv.io.seams import closed_grid, warn_of_seam
-from quadcurv.mesh import Mesh, QuadGrid, QuadMesh, Recovery, StaggeredGrid
+from quadcurv.mesh import GridBlocks, Mesh, QuadGrid, QuadMesh, Recovery, StaggeredGrid
 from quadcurv.types import MeshError
 
 Wrap = Sequence[bool]
@@ -41,6 +41,7 @@ def as_mesh(mesh: Any, quads: ArrayLike | None = None, wrap: Wrap | None = None)
         One of
 
         - QuadMesh, QuadGrid, StaggeredGrid: returned as they are;
+        - GridBlocks of vertices: as one QuadMesh; the verbs take blocks as they are;
         - trimesh.Trimesh, or a Scene of one: its triangles are paired into the quads they were cut from,
           see Notes;
         - pyvista.PolyData, or UnstructuredGrid of polygons;
@@ -102,6 +103,9 @@ def opened(
     if isinstance(mesh, QuadMesh | QuadGrid | StaggeredGrid):
         _refuse(quads, wrap, type(mesh).__name__)
         return mesh
+    if isinstance(mesh, GridBlocks):
+        _refuse(quads, wrap, "GridBlocks")
+        return mesh.to_mesh()
     if isinstance(mesh, str | os.PathLike):
         return _read(mesh, quads, wrap, seams, join)
     if isinstance(mesh, tuple) and len(mesh) == 2:

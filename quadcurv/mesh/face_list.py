@@ -182,6 +182,10 @@ class QuadMesh:
         """Return the same mesh whose positions were given in another precision."""
         return self._like(roundoff=roundoff)
 
+    def with_connectivity(self, connectivity: Connectivity) -> QuadMesh:
+        """Return the same points under another connectivity of as many vertices."""
+        return self._like(connectivity=connectivity)
+
     def flat(self, values: NDArray[Any]) -> NDArray[Any]:
         """Return values in the shape of results as (n, ...): what :meth:`in_shape` takes."""
         return values
