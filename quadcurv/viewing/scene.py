@@ -134,13 +134,14 @@ class Scene:
         self.plotter.renderer.RemoveAllViewProps()
         low, high = field.limits
         patches = [*field.patches(), *marks]
-        left, right = 0.08, 0.92 - 0.11 * len(patches)
+        step = max(0.11, 140 / self.plotter.window_size[0])  # room for the labels side by side
+        left, right = 0.08, 0.92 - step * len(patches)
         self.strip(np.linspace(left, right, 257), table.values[:, :3])
         self.text(field.title, ((left + right) / 2, 0.82), 11)
         for place, label in field.ticks():
             self.text(label, (left + (place - low) / (high - low) * (right - left), 0.2), 10)
         for i, (label, colour) in enumerate(patches):
-            x = right + 0.11 * (i + 1)
+            x = right + step * (i + 1)
             for margin, fill in ((1.0, "grey"), (0.0, colour)):  # an outline, for what is pale
                 dx, dy = margin / self.plotter.window_size[0], margin / _LEGEND_HEIGHT
                 ends = np.array([x - 0.03 - dx, x + 0.03 + dx])
