@@ -25,7 +25,7 @@ from quadcurv.mesh import Mesh
 from quadcurv.precision import warn_of_rounding
 from quadcurv.schemes import SCHEMES, Fit, Scheme, as_scheme
 from quadcurv.stencils import Stencils
-from quadcurv.tables import as_html, by_column, finite, progress, short, text_tables, write_csv
+from quadcurv.tables import as_html, as_latex, by_column, finite, progress, short, text_tables, write_csv
 from quadcurv.types import Bools, Floats, Ints
 
 NORMS = ("one", "two", "inf", "one-area", "two-area")
@@ -218,10 +218,22 @@ class Comparison:
 
     def tables(self) -> list[Table]:
         """Rich tables, 80 columns at most: curvature and norms by scheme, by valence, by pair."""
-        tables = [*self._main_table(), *self._valence_tables()]
+        tables = [*text_tables(*self._main_rows()), *self._valence_tables()]
         return tables if self.exact is not None else tables + self._pair_tables()
 
-    def _main_table(self) -> list[Table]:
+    def to_latex(self) -> str:
+        r"""Return the first of :meth:`tables` for LaTeX, with the package booktabs.
+
+        Examples
+        --------
+        >>> import quadcurv as qc
+        >>> ball, _, _ = qc.surfaces.cubed_sphere().sample((4, 4), "faces")
+        >>> print(qc.compare(ball, ["liu"], exact=1.0).to_latex().splitlines()[0])
+        \begin{table}
+        """
+        return as_latex(*self._main_rows())
+
+    def _main_rows(self) -> tuple[str, list[str], list[list[str]]]:
         title = f"Mean curvature H (1/length) and |H - {self.reference}| where both are known"
         header = ["scheme", "min H", "max H", "vertices", "mean", "by area", "rms", "max"]
         rows = []
@@ -231,7 +243,7 @@ class Comparison:
             low, high = (known.min(), known.max()) if known.size else (np.nan, np.nan)
             ends = f"{low:.4g}", f"{high:.4g}", str(e["vertices"])
             rows.append([name, *ends, *(short(e[k]) for k in ("one", "one-area", "two", "inf"))])
-        return text_tables(title, header, rows)
+        return title, header, rows
 
     def _valence_tables(self) -> list[Table]:
         groups = self.by_valence()

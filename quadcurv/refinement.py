@@ -18,7 +18,7 @@ from quadcurv.curvature import dual_areas, gaussian_curvature, principal_curvatu
 from quadcurv.extras import need
 from quadcurv.schemes import Scheme
 from quadcurv.surfaces import SURFACES, Surface
-from quadcurv.tables import as_html, by_column, finite, progress, short, text_table, write_csv
+from quadcurv.tables import as_html, as_latex, by_column, finite, progress, short, text_table, write_csv
 from quadcurv.types import Floats, Ints
 
 Quantity = Literal["mean_curvature", "gaussian_curvature", "k1", "k2"]
@@ -252,6 +252,21 @@ class Convergence:
         Where all errors are rounding the last column says "exact": their rate, about -2, is that of
         eps / h^2. Vertices without a result are left out; the title says where there are any.
         """
+        title, header, rows = self._rows_of(norm)
+        return text_table(title, header, rows, dim=range(1, len(rows), 2))
+
+    def to_latex(self, norm: str = "one") -> str:
+        r"""Return :meth:`table` for LaTeX, with the package booktabs.
+
+        Examples
+        --------
+        >>> import quadcurv as qc
+        >>> print(qc.convergence("torus", "liu", [8, 16]).to_latex("inf").splitlines()[-2])
+        \end{table}
+        """
+        return as_latex(*self._rows_of(norm))
+
+    def _rows_of(self, norm: str) -> tuple[str, list[str], list[list[str]]]:
         rows: list[list[str]] = []
         for scheme in self.schemes:
             rates = ("" if np.isnan(r) else f"{r:.2f}" for r in self.rates(scheme, norm))
@@ -262,7 +277,7 @@ class Convergence:
         if lost:
             title += f"\n(vertices left out: {', '.join(f'{s} {self.undefined[s].tolist()}' for s in lost)})"
         header = ["scheme", *(f"{r}x{c}" for r, c in self.shapes), "fit"]
-        return text_table(title, header, rows, dim=range(1, len(rows), 2))
+        return title, header, rows
 
     def __rich_console__(self, console: Console, options: Any) -> Iterator[Table]:
         yield self.table("one")

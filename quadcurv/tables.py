@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import io
+import re
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, TypeVar
@@ -81,6 +82,39 @@ def as_html(*tables: Any) -> str:
     console.print(*tables)
     block = '<pre style="line-height: 1.2; white-space: pre">{code}</pre>'
     return console.export_html(code_format=block, inline_styles=True)
+
+
+_LATEX = {c: f"\\{c}" for c in "&%$#_{}"} | {"\\": r"\textbackslash{}", "~": r"\textasciitilde{}"}
+_LATEX |= {"^": r"\textasciicircum{}", "|": "$|$", "<": "$<$", ">": "$>$"}
+
+
+def as_latex(title: str, columns: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
+    """Table for LaTeX with the package booktabs; numbers as a paper has them."""
+    lines = [" & ".join(map(_latex, row)) + r" \\" for row in (columns, *rows)]
+    return "\n".join(
+        (
+            r"\begin{table}",
+            r"\centering",
+            rf"\caption{{{_latex(title)}}}",
+            rf"\begin{{tabular}}{{l{'r' * (len(columns) - 1)}}}",
+            r"\toprule",
+            lines[0],
+            r"\midrule",
+            *lines[1:],
+            r"\bottomrule",
+            r"\end{tabular}",
+            r"\end{table}",
+            "",
+        )
+    )
+
+
+def _latex(text: str) -> str:
+    number = re.fullmatch(r"(-?[\d.]+)(?:e([+-]?\d+))?", text)
+    if number is None:
+        return "".join(_LATEX.get(c, c) for c in text)
+    power = f" \\cdot 10^{{{int(number[2])}}}" if number[2] else ""
+    return f"${number[1]}{power}$"
 
 
 def short(value: float) -> str:

@@ -2,15 +2,24 @@
 
 from __future__ import annotations
 
+import base64
+import io
+import json
+import os
 import re
+import subprocess
 import sys
 from html.parser import HTMLParser
+from pathlib import Path
 
 import numpy as np
 import pytest
+from PIL import Image
 
 import quadcurv as qc
 from quadcurv import html, surfaces
+
+ROOT = Path(__file__).parents[1]
 
 BALL = surfaces.cubed_sphere().sample((4, 4), "faces")[0]
 SHOWN = {
@@ -116,3 +125,29 @@ def test_data_frames_name_their_extra(monkeypatch):
     for name in ("comparison", "convergence"):
         with pytest.raises(ImportError, match=r'pandas is not installed: pip install "quadcurv\[notebook\]"'):
             SHOWN[name].to_dataframe()
+
+
+def test_the_notebook_for_first_steps_runs_and_shows_pictures(tmp_path):
+    """By nbmake, as anybody would run it; then what its cells show is looked at."""
+    pytest.importorskip("nbmake")
+    notebook = tmp_path / "first_steps.ipynb"
+    notebook.write_bytes((ROOT / "examples" / notebook.name).read_bytes())
+    command = [sys.executable, "-m", "pytest", "-q", "-c", "/dev/null", "-p", "no:cacheprovider"]
+    run = subprocess.run(
+        [*command, "--nbmake", "--overwrite", f"--rootdir={tmp_path}", notebook],
+        capture_output=True,
+        text=True,
+        timeout=300,
+        env={**os.environ, "PYTHONPATH": str(ROOT)},
+        check=False,
+    )
+    assert run.returncode == 0, run.stdout
+    cells = json.loads(notebook.read_text(encoding="utf-8"))["cells"]
+    shown = [output["data"] for cell in cells for output in cell.get("outputs", [])]
+    assert len(shown) == sum(cell["cell_type"] == "code" for cell in cells)
+    assert "jet" in "".join(shown[2]["text/html"])
+    assert "<iframe" in "".join(shown[3]["text/html"])
+    picture = np.asarray(Image.open(io.BytesIO(base64.b64decode(shown[4]["image/png"]))).convert("RGB"))
+    ink = (picture < 200).any(axis=2)
+    assert 0.01 < ink.mean() < 0.5
+    assert len(np.unique(picture.reshape(-1, 3), axis=0)) > 100

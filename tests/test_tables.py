@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 from rich.console import Console
 
-from quadcurv.tables import as_html, finite, short, text_table, text_tables, write_csv
+import quadcurv as qc
+from quadcurv.tables import as_html, as_latex, finite, short, text_table, text_tables, write_csv
 
 
 def printed(*things, width=80):
@@ -73,3 +74,27 @@ def test_short_numbers(value, text):
 def test_json_has_no_nan():
     found = finite({"a": [1.0, np.nan, {"b": np.inf}], "c": 3})
     assert json.dumps(found, allow_nan=False) == '{"a": [1.0, null, {"b": null}], "c": 3}'
+
+
+def test_latex_escapes_names_and_writes_numbers_as_papers_do():
+    text = as_latex("a_b & 5 %", ["scheme", "n^2"], [["x_1", "-1.2e-3"], ["~", "0.5"], ["\\", "8x8"]])
+    assert text.splitlines()[2:9] == [
+        r"\caption{a\_b \& 5 \%}",
+        r"\begin{tabular}{lr}",
+        r"\toprule",
+        r"scheme & n\textasciicircum{}2 \\",
+        r"\midrule",
+        r"x\_1 & $-1.2 \cdot 10^{-3}$ \\",
+        r"\textasciitilde{} & $0.5$ \\",
+    ]
+    assert r"\textbackslash{} & 8x8 \\" in text
+
+
+def test_results_in_latex_hold_what_their_tables_do():
+    ball = qc.surfaces.cubed_sphere().sample((4, 4), "faces")[0]
+    found = qc.compare(ball, ["liu", "cotan-8"], exact=1.0)
+    rows = [line.split(" & ") for line in found.to_latex().splitlines() if line.endswith(r"\\")]
+    assert [row[0] for row in rows] == ["scheme", "liu", "cotan-8"]
+    assert rows[1][3] == "$98$"
+    run = qc.convergence("torus", "liu", [8, 16, 32])
+    assert f"${run.rates('liu', 'inf')[-1]:.2f}$" in run.to_latex("inf")

@@ -187,9 +187,7 @@ def _terms(x: Floats, degree: int) -> Floats:
     """x^a y^b (..., terms) with 0 < a + b <= degree."""
     terms = np.empty((*x.shape[:-1], (degree + 1) * (degree + 2) // 2 - 1))
     terms[..., :2] = x
-    for t, (a, b) in enumerate(
-        _TERMS[2 : terms.shape[-1]], 2
-    ):  # a coordinate times one of less degree
+    for t, (a, b) in enumerate(_TERMS[2 : terms.shape[-1]], 2):  # a coordinate times one of less degree
         lower = (a - 1, b) if a else (a, b - 1)
         np.multiply(terms[..., _TERMS.index(lower)], x[..., int(not a)], out=terms[..., t])
     return terms
