@@ -58,21 +58,22 @@ def run(
         compiled.evaluate_grid(mesh, scheme, boundary, results)
     if _of_cells(mesh) and "dual_areas" in results:
         results["dual_areas"] *= _CELLS
-    if mesh.roundoff > _DOUBLE and not has_holes(mesh):
-        far = run(_far_away(mesh), scheme, results.keys() - {"dual_areas"}, boundary)
+    one = mesh.mesh if isinstance(mesh, GridBlocks) and not mesh.of_cells else mesh
+    if mesh.roundoff > _DOUBLE and not has_holes(mesh) and not isinstance(one, GridBlocks):
+        far = run(_far_away(one, mesh.roundoff), scheme, results.keys() - {"dual_areas"}, boundary)
         for name, values in far.items():
             results[name][np.isnan(values)] = np.nan
     return results
 
 
-def _far_away(mesh: Mesh) -> Mesh:
+def _far_away(mesh: Mesh, roundoff: float) -> Mesh:
     """The mesh so far from the origin that its positions are rounded, in double precision, as those given.
 
     What has no area but for rounding is then NaN by the same test as everywhere.
     """
     moved, arrays = copy.copy(mesh), mesh.arrays()
     size = max(float(np.abs(x).max()) for x in arrays.values())
-    far = {name: x + size * mesh.roundoff / _DOUBLE for name, x in arrays.items()}
+    far = {name: x + size * roundoff / _DOUBLE for name, x in arrays.items()}
     moved.__dict__.update(far, roundoff=_DOUBLE)
     return moved
 
