@@ -35,10 +35,11 @@ def measure(script: ModuleType, prefix: str = "") -> Measured:
 
 @contextmanager
 def progress(what: str) -> Iterator[None]:
-    """Say on stderr what was done and how long it took: on a terminal, in a file and in a pipe."""
+    """Say on stderr what is being done, then how long it took: on a terminal, in a file and in a pipe."""
     start = time.perf_counter()
+    print(what, end=": ", file=sys.stderr, flush=True)
     yield
-    print(f"{what}: {time.perf_counter() - start:.1f} s", file=sys.stderr, flush=True)
+    print(f"{time.perf_counter() - start:.1f} s", file=sys.stderr, flush=True)
 
 
 @paper_style

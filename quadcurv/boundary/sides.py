@@ -87,9 +87,10 @@ def frame(grid: QuadGrid | StaggeredGrid, boundary: str) -> tuple[Frame, Indices
     """Ghosts by index around a grid, NaN where nothing is known; border vertices that they do not serve."""
     points = grid.points if isinstance(grid, QuadGrid) else grid.primal
     (r, c, _), wrap = points.shape, grid.wrap
-    beyond, beside = np.full((2, c, 3), np.nan), np.full((2, 0 if wrap[1] else r + 2, 3), np.nan)
-    if wrap[0]:
-        beyond[:] = points[[-1, 0]]
+    beyond = points[[-1, 0]] if wrap[0] else np.full((2, c, 3), np.nan)
+    beside = np.full((2, 0 if wrap[1] else r + 2, 3), np.nan)
+    if all(wrap):
+        return Frame(beyond, beside), np.empty(0, np.int64)
     bad = None
     for axis, outside in enumerate((beyond, beside[:, 1:-1])):
         if wrap[axis] or boundary == "nan":
