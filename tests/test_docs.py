@@ -95,3 +95,11 @@ def test_builds_without_a_warning(tmp_path):
             r"<(?:script|link|img|iframe)[^>]*(?:src|href)=.(https?://[^\"']+)", built.read_text()
         )
         assert not loaded, f"{built.name} loads {loaded}"
+
+
+def test_the_paper_cites_what_it_lists_and_names_files_that_exist():
+    paper, listed = ((DOCS / name).read_text(encoding="utf-8") for name in ("paper.md", "paper.bib"))
+    cited = set(re.findall(r"@(\w+)", paper))
+    assert cited == set(re.findall(r"@\w+\{(\w+),", listed))
+    for name in re.findall(r"`(comparisons/[\w./]+)`", paper):
+        assert (DOCS.parent / name).exists(), name
