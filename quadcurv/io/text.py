@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from quadcurv.types import Indices
 
 _PART = 8 << 20  # bytes looked at together, so that what is needed beside a file does not grow with it
+_END = -(2**53 - 1)  # added to numbers that are read, to see that all of them were
 _SPACE = 32  # and all control characters; those that are no white space end in the numbers' own check
 
 
@@ -101,10 +102,14 @@ def numbers(text: bytes, kind: type = float) -> NDArray[Any]:
     ValueError
         One of them is no number.
     """
+    # An older numpy stops, with a warning that few see, where a word is no number: so does it before the end.
     try:
-        return np.fromstring(text, kind, sep=" ") if text and not text.isspace() else np.empty(0, kind)
-    except DeprecationWarning as error:  # of an older numpy, where warnings are errors
+        found: NDArray[Any] = np.fromstring(text + b" %d" % _END, kind, sep=" ")
+    except DeprecationWarning as error:  # where warnings are errors
         raise ValueError(str(error)) from None
+    if not len(found) or found[-1] != _END:
+        raise ValueError("a word is no number")
+    return found[:-1]
 
 
 def distinct(ascending: NDArray[Any]) -> NDArray[Any]:
