@@ -26,6 +26,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import quadcurv as qc
+from comparisons import gpu
 from comparisons.common import arguments
 from comparisons.figures import COLOURS, MARKERS, figure, paper_style, save_figure
 from quadcurv.kernels import quad, ranges, vector
@@ -542,7 +543,10 @@ def versions() -> str:
 
 
 def markdown(
-    ratios: list[Ratio], times: dict[str, dict[int, dict[str, Floats]]], peak: dict[str, float]
+    ratios: list[Ratio],
+    times: dict[str, dict[int, dict[str, Floats]]],
+    peak: dict[str, float],
+    quick: bool = False,
 ) -> str:
     """The report."""
     counted = operations()
@@ -600,6 +604,7 @@ def markdown(
             row = [f"{np.median(table[n][name]) / n * 1e9:.1f}" if name in table[n] else "" for n in sizes]
             lines.append(f"| {name} | {' | '.join(row)} |")
         lines.append("")
+    lines += ["## On a graphics processor", "", *gpu.lines(quick), ""]
     return "\n".join(lines)
 
 
@@ -677,7 +682,7 @@ def main(output: Path, quick: bool = False) -> dict[str, Any]:
     ratios, times, peak = measure(quick)
     output.mkdir(parents=True, exist_ok=True)
     report = output / REPORT.name if quick else REPORT
-    report.write_text(markdown(ratios, times, peak))
+    report.write_text(markdown(ratios, times, peak, quick))
     plots(output, ratios, times)
     return {"ratios": ratios, "operations": operations(), "report": report}
 

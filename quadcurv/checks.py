@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
+from quadcurv.device_arrays import as_cupy, is_on_device, on_host
 from quadcurv.ragged import Faces
 from quadcurv.stencils import Polygons
 from quadcurv.types import Bools, Floats, Indices, Ints, MeshError
@@ -107,12 +108,14 @@ def checked_points(points: ArrayLike, name: str, shape: tuple[Any, ...]) -> Floa
     """Read-only C-contiguous float64; a number in `shape` is required, a letter is free."""
     from quadcurv.kernels.extent import largest
 
+    if is_on_device(points):
+        return _checked_on_device(points, name, shape)
     try:
         given = np.asarray(points)
     except (ValueError, OverflowError):  # rows of different lengths, integers beyond all floats
         given = np.empty(0, object)
-    if hasattr(points, "__dask_graph__") or hasattr(points, "__cuda_array_interface__"):
-        raise MeshError(f"{name}: a lazy or device array ({type(points).__name__}), expected one in memory")
+    if hasattr(points, "__dask_graph__"):
+        raise MeshError(f"{name}: a lazy array ({type(points).__name__}), expected one in memory")
     if np.ma.is_masked(points):
         raise MeshError(f"{name}: masked entries, expected a number in each")
     if given.dtype.kind not in "fiu":
@@ -145,6 +148,25 @@ def checked_points(points: ArrayLike, name: str, shape: tuple[Any, ...]) -> Floa
     return array
 
 
+def _checked_on_device(points: Any, name: str, shape: tuple[Any, ...]) -> Any:
+    """As `checked_points`, a cupy array."""
+    given = as_cupy(points)
+    if given.dtype.kind not in "fiu":
+        raise MeshError(f"{name}: expected real numbers, got dtype {given.dtype}")
+    if given.ndim != len(shape) or any(
+        isinstance(want, int) and have != want for have, want in zip(given.shape, shape, strict=True)
+    ):
+        raise MeshError(f"{name}: shape {given.shape}, expected ({', '.join(map(str, shape))})")
+    array = given.astype(np.float64, order="C", copy=False)
+    good = (abs(array) <= _LARGEST).reshape(-1, 3).all(axis=1)
+    if array.size and not bool(good.all()):
+        bad = np.flatnonzero(~on_host(good))
+        raise MeshError(
+            f"{name}: {bad.size} point(s) that are not finite or beyond {_LARGEST:g}, first vertex {bad[0]}"
+        )
+    return array
+
+
 def unit_roundoff(points: ArrayLike) -> float:
     """Relative rounding error of positions as they are given; integers have that of doubles."""
     dtype = getattr(points, "dtype", np.dtype(float))
@@ -154,8 +176,12 @@ def unit_roundoff(points: ArrayLike) -> float:
 def masked_points(points: Any, mask: ArrayLike | None) -> tuple[Floats, Bools | None, list[Finding]]:
     """Points of a grid, NaN where masked; the mask if it hides any; what is NaN without being masked."""
     given = np.ma.getdata(points) if isinstance(points, np.ma.MaskedArray) else points
-    hidden = _hidden(points, mask)
     findings: list[Finding] = []
+    if is_on_device(points):
+        if mask is not None:
+            raise MeshError("mask: grids on a device have no holes; give points in memory")
+        return checked_points(points, "points", ("r", "c", 3)), None, findings
+    hidden = _hidden(points, mask)
     if hidden is None:
         try:
             return checked_points(given, "points", ("r", "c", 3)), None, findings

@@ -11,6 +11,7 @@ import scipy
 from numpy.typing import NDArray
 
 from quadcurv.checks import Finding, GivenFaces, checked_faces
+from quadcurv.device_arrays import as_cupy
 from quadcurv.polygons import cut
 from quadcurv.stencils import Polygons, edges, face_pairs
 from quadcurv.types import Bools, Floats, Indices, Ints
@@ -76,6 +77,11 @@ class Connectivity:
         from quadcurv.kernels import topology
 
         return self.kind == topology.INTERIOR
+
+    @cached_property
+    def ring_on_device(self) -> Any:
+        """`ring` on a device, copied there once."""
+        return as_cupy(self.ring)
 
     @cached_property
     def scattered(self) -> bool:

@@ -241,6 +241,8 @@ def gaussian_curvature(
     mesh = _taken(mesh)
     if not (isinstance(scheme, str) and scheme == "angle_defect"):
         return _split(mesh, _fitted(mesh, _as_fit(scheme), boundary).gaussian)
+    if drivers.device.holds(mesh):
+        raise ValueError("scheme: angle_defect does not run on a device; give it positions in memory")
     stencils = one_rings(mesh.mesh if isinstance(mesh, GridBlocks) else mesh, boundary)
     defect, area = angle_defect(stencils)
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -374,6 +376,8 @@ def mass_matrix(mesh: Any, scheme: SchemeName | str | Scheme = DEFAULT_MATRIX) -
     (386, 386)
     """
     mesh = _taken(mesh)
+    if drivers.device.holds(mesh):
+        return drivers.device.mass_matrix(dual_areas(mesh, scheme))
     return scipy.sparse.diags_array(mesh.flat(dual_areas(mesh, scheme)))
 
 
@@ -414,6 +418,8 @@ def laplace_beltrami(mesh: Any, f: ArrayLike, scheme: SchemeName | str | Scheme 
     True
     """
     mesh, chosen = _taken(mesh), _as_laplacian(scheme)
+    if drivers.device.holds(mesh):
+        return drivers.device.laplace_beltrami(mesh, f, chosen)
     stencils = mesh.stencils()
     given = mesh.joined(f) if isinstance(mesh, GridBlocks) and not mesh.of_cells else np.asarray(f)
     if given.dtype.kind not in "biuf":

@@ -8,6 +8,7 @@ _EXTRAS = {
     "matplotlib": "view",
     "pyvista": "view",
     "vtkmodules": "view",
+    "cupy": "gpu",
     "meshlane": "formats",
     "pymeshlab": "meshlab",
     "pandas": "notebook",

@@ -6,6 +6,7 @@ import warnings
 
 import numpy as np
 
+from quadcurv.device_arrays import on_host, taken
 from quadcurv.mesh import GridBlocks, Mesh, QuadGrid, QuadMesh
 from quadcurv.types import Floats, PrecisionWarning
 
@@ -29,7 +30,7 @@ def rounding_error(mesh: Mesh | GridBlocks) -> tuple[float, float]:
     extent : float
         Largest side of the bounding box, in length; both are of a sample of the edges.
     """
-    begin, end = _edges(mesh)
+    begin, end = map(on_host, _edges(mesh))
     step = end - begin
     length2 = np.einsum("ix,ix->i", step, step)
     known = np.isfinite(length2) & (length2 > 0)
@@ -55,6 +56,7 @@ def warn_of_rounding(mesh: Mesh | GridBlocks, H: Floats) -> None:
     error, extent = rounding_error(mesh)
     if error * extent < _NOTED:  # most meshes: nothing of H needs to be looked at
         return
+    H = on_host(H)
     known = np.abs(H[np.isfinite(H)])
     typical = max(float(np.median(known)) if known.size else 0.0, 1 / extent)
     if error >= _NOTED * typical:
@@ -74,11 +76,11 @@ def _edges(mesh: Mesh | GridBlocks) -> tuple[Floats, Floats]:
         return np.concatenate(begin), np.concatenate(end)
     if isinstance(mesh, QuadMesh):
         faces = mesh.faces[:: len(mesh.faces) // _SAMPLE + 1]
-        return mesh.points[faces[:, [0, 1]].ravel()], mesh.points[faces[:, [1, 2]].ravel()]
+        return taken(mesh.points, faces[:, [0, 1]].ravel()), taken(mesh.points, faces[:, [1, 2]].ravel())
     x = mesh.points if isinstance(mesh, QuadGrid) else mesh.primal
     r, c = x.shape[:2]
     i, j = np.unravel_index(np.arange(0, r * c, r * c // _SAMPLE + 1), (r, c))
-    return (
-        np.concatenate((x[np.minimum(i, r - 2), j], x[i, np.minimum(j, c - 2)])),
-        np.concatenate((x[np.minimum(i, r - 2) + 1, j], x[i, np.minimum(j, c - 2) + 1])),
-    )
+    below, beside = np.minimum(i, r - 2), np.minimum(j, c - 2)
+    first = np.concatenate((below * c + j, i * c + beside))
+    second = np.concatenate((below * c + c + j, i * c + beside + 1))
+    return taken(x.reshape(-1, 3), first), taken(x.reshape(-1, 3), second)

@@ -17,6 +17,7 @@ HEAVY = {"trimesh", "pymeshlab", "pyvista", "igl", "matplotlib", "vtk", "vtkmodu
 # Rooms (a module or a package) from the lowest floor up: a room imports from lower floors, or within itself.
 FLOORS = [
     ["extras", "html", "types"],
+    ["device_arrays"],
     ["kernels", "ragged"],
     ["coincidence", "polygons", "stencils"],
     ["checks"],

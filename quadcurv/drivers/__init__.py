@@ -10,7 +10,7 @@ import numpy as np
 import scipy
 
 from quadcurv.boundary import checked_boundary, one_rings
-from quadcurv.drivers import blocks, compiled, direct, fits
+from quadcurv.drivers import blocks, compiled, device, direct, fits
 from quadcurv.drivers.fits import each
 from quadcurv.mesh import GridBlocks, Mesh, QuadGrid, QuadMesh, StaggeredGrid
 from quadcurv.schemes import Curvatures, Fit, Laplacian
@@ -28,6 +28,8 @@ _DOUBLE = 2.0**-53  # unit roundoff
 
 def fit(mesh: Mesh | GridBlocks, scheme: Fit, boundary: str = "extrapolate") -> Curvatures:
     """Curvatures by a fit at every vertex of a mesh, in the shape of its results; of blocks (n,)."""
+    if device.holds(mesh):
+        device.checked_scheme(scheme)
     if isinstance(mesh, GridBlocks):
         return each(fits.fit(mesh.mesh, scheme, boundary), lambda values: values[: mesh.n])
     if has_holes(mesh):
@@ -43,6 +45,8 @@ def run(
     out: Mapping[str, Floats] | None = None,
 ) -> dict[str, Floats]:
     """Results by name (see `direct.PER_VERTEX`), into the arrays of `out` where there are any."""
+    if device.holds(mesh):
+        return device.evaluate(mesh, scheme, wanted, boundary, out)  # type: ignore[arg-type]
     checked_boundary(boundary)
     results = _arrays(mesh, wanted, {} if out is None else out)
     if isinstance(mesh, GridBlocks):
@@ -82,6 +86,10 @@ def stiffness(
     mesh: Mesh | GridBlocks, scheme: Laplacian, out: scipy.sparse.csr_array | None = None
 ) -> scipy.sparse.csr_array:
     """Stiffness matrix without ghosts, NaN wherever it is not finite; `out` is for the fast schemes."""
+    if device.holds(mesh):
+        if out is not None:
+            raise ValueError("out: on a device a new matrix is assembled each time")
+        return device.stiffness(mesh, scheme)  # type: ignore[arg-type]
 
     def assembled(stencils: Stencils) -> scipy.sparse.csr_array:
         if scheme.fast is not None:

@@ -12,6 +12,7 @@ import numpy as np
 import scipy
 
 from quadcurv.boundary import REACH, cells_at_poles, closed, frame, one_rings, part_around, parts_at_poles
+from quadcurv.device_arrays import taken
 from quadcurv.drivers import direct
 from quadcurv.mesh import QuadGrid, QuadMesh, StaggeredGrid
 from quadcurv.schemes import Diamond, Laplacian
@@ -183,21 +184,11 @@ def stiffness(
 
     The arrays of `out`, of the same pattern, are written to.
     """
-    from quadcurv.kernels import ranges, rings, topology
+    from quadcurv.kernels import ranges, rings
     from quadcurv.kernels.compiled import flat
 
-    n, p, others = stencils.n, len(stencils.points), stencils.irregular
-    indptr, rows = np.arange(0, 9 * n + 1, 9), None
-    if others.size:
-        size = np.full(n, 9)
-        vertices, faces = topology.part_around(stencils.faces, others, p, 2)
-        closed = np.zeros(vertices.size, bool)
-        part = Stencils(stencils.points[vertices], faces, (vertices.size,), closed, stencils.orientable)
-        rows = scipy.sparse.csr_array(direct.without_infinity(scheme.assemble(part)[0])[: others.size])
-        rows = scipy.sparse.csr_array((rows.data, vertices[rows.indices], rows.indptr), (others.size, p))
-        rows.sort_indices()
-        size[others] = np.diff(rows.indptr)
-        np.cumsum(size, out=indptr[1:])
+    n, p = stencils.n, len(stencils.points)
+    indptr, others, rows = row_starts(stencils, scheme)
     if indptr[-1] > np.iinfo(np.int32).max:
         return direct.without_infinity(scheme.assemble(stencils)[0])
     indptr = indptr.astype(np.int32)
@@ -207,12 +198,39 @@ def stiffness(
     else:
         _check_matrix(out, (n, p), indptr)
     if rows is not None:
-        place = np.repeat(indptr[others] - rows.indptr[:-1], np.diff(rows.indptr)) + np.arange(rows.nnz)
+        place = row_places(indptr, others, rows)
         out.indices[place], out.data[place] = rows.indices, rows.data
     points, ring = flat(stencils.points), flat(stencils.ring)
     kernel = partial(rings.ring_stiffness, points, ring, flat(indptr), out.indices, out.data)
     ranges.over(kernel, n, _ROW_WORK * n, rings.BLOCK)
     return out
+
+
+def row_starts(
+    stencils: Stencils, scheme: Laplacian
+) -> tuple[Indices, Indices, scipy.sparse.csr_array | None]:
+    """Where the rows of the stiffness begin (n + 1,), irregular vertices, and the rows of these if any."""
+    from quadcurv.kernels import topology
+
+    n, p, others = stencils.n, len(stencils.points), stencils.irregular
+    indptr = np.arange(0, 9 * n + 1, 9)
+    if not others.size:
+        return indptr, others, None
+    size = np.full(n, 9)
+    vertices, faces = topology.part_around(stencils.faces, others, p, 2)
+    closed = np.zeros(vertices.size, bool)
+    part = Stencils(taken(stencils.points, vertices), faces, (vertices.size,), closed, stencils.orientable)
+    rows = scipy.sparse.csr_array(direct.without_infinity(scheme.assemble(part)[0])[: others.size])
+    rows = scipy.sparse.csr_array((rows.data, vertices[rows.indices], rows.indptr), (others.size, p))
+    rows.sort_indices()
+    size[others] = np.diff(rows.indptr)
+    np.cumsum(size, out=indptr[1:])
+    return indptr, others, rows
+
+
+def row_places(indptr: Indices, others: Indices, rows: scipy.sparse.csr_array) -> Indices:
+    """Where in all rows the entries of irregular ones stand."""
+    return np.repeat(indptr[others] - rows.indptr[:-1], np.diff(rows.indptr)) + np.arange(rows.nnz)
 
 
 def _check_matrix(out: scipy.sparse.csr_array, shape: tuple[int, int], indptr: np.ndarray) -> None:

@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 from quadcurv import html
 from quadcurv.checks import Finding, Report, checked_points, unit_roundoff
 from quadcurv.connectivity import Connectivity, connect
+from quadcurv.device_arrays import on_host
 from quadcurv.stencils import Stencils
 from quadcurv.types import Floats, Indices, Ints, MeshWarning
 
@@ -42,7 +43,7 @@ class QuadMesh:
     points : (n, 3) array_like of float
         Positions. C-contiguous float64 is not copied but seen read-only; all else is converted.
         float32 is accepted and computed with in float64, yet its rounding, eps / h^2 in a curvature,
-        stays.
+        stays. Positions on a device (cupy, or what has __cuda_array_interface__ or DLPack) stay there.
     faces : (m, 4) or (m, 3) array_like of int, or sequence of polygons
         Vertex indices, counter-clockwise. In an (m, 4) array a last entry of -1 marks a triangle.
         A polygon of more than four sides is kept for the schemes that are made for polygons, and cut into
@@ -96,7 +97,7 @@ class QuadMesh:
         checked = checked_points(points, "points", ("n", 3))
         self.__dict__.update(
             points=checked,
-            connectivity=connect(faces, checked),
+            connectivity=connect(on_host(faces), on_host(checked)),
             recovery=None,
             roundoff=unit_roundoff(points),
         )
@@ -130,7 +131,11 @@ class QuadMesh:
     def report(self) -> Report:
         """What was mended, and what has no answer; a closed mesh that is inside out is told of too."""
         findings = self.connectivity.findings
-        if self.orientable and self.connectivity.closed.all() and _volume(self.points, self.faces) < 0:
+        if (
+            self.orientable
+            and self.connectivity.closed.all()
+            and _volume(on_host(self.points), self.faces) < 0
+        ):
             findings += (Finding("inside_out", 1, ""),)
         return Report(findings)
 
@@ -203,7 +208,7 @@ class QuadMesh:
 
 def summary_table(title: str, points: Floats, report: Report) -> str:
     """What a notebook shows of a mesh: its extent and what was mended."""
-    x = points.reshape(-1, 3)
+    x = on_host(points).reshape(-1, 3)
     low, high = np.nanmin(x, axis=0), np.nanmax(x, axis=0)
     rows = [(name, f"{a:.4g} to {b:.4g}") for name, a, b in zip("xyz", low, high, strict=True)]
     return html.table(title, [*rows, ("report", str(report))])

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from quadcurv.checks import Report, checked_wrap, masked_points, unit_roundoff
+from quadcurv.device_arrays import on_host
 from quadcurv.mesh.face_list import QuadMesh, summary_table, warn_of
 from quadcurv.stencils import Stencils, grid_faces
 from quadcurv.types import Bools, Floats, MeshError
@@ -25,6 +26,7 @@ class QuadGrid:
         Positions; the surface normal is that of the first direction times the second. Grids of
         ``numpy.meshgrid(x, y, indexing="ij")`` with z = f(x, y) have it along +z, those of
         ``indexing="xy"``, where x runs along the second direction, along -z, and H of the other sign.
+        Positions on a device (cupy, or what has __cuda_array_interface__ or DLPack) stay there.
     wrap : (bool, bool)
         Whether the last row (column) is followed by the first, which is not repeated.
     mask : (r, c) array_like of bool, optional
@@ -160,7 +162,7 @@ class QuadGrid:
 def _refuse_repetition(points: Floats, axis: int, name: str) -> None:
     """The first row of a wrap that the last one repeats would make quads without area."""
     with np.errstate(invalid="ignore"):
-        first, last, second = (points.take(k, axis) for k in (0, -1, 1))
+        first, last, second = (on_host(points.take(k, axis)) for k in (0, -1, 1))
         gap, step = np.abs(first - last), np.abs(second - first)
     known = np.isfinite(gap)
     # Files in single precision, and grids far from the origin, repeat a row to some digits only.
