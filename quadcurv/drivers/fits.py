@@ -1,6 +1,6 @@
 """Any fit on any mesh: what it sees of the mesh, NaN where nothing is known, the sign, the shape.
 
-Borders: with boundary="extrapolate" grids and face lists go on by up to two layers of ghosts, by quintic
+Borders: with boundary="extrapolate" grids and face lists go on by up to three layers of ghosts, by quintic
 extrapolation along strips of six points, wherever the strips are complete and smooth (see `boundary`).
 Elsewhere a neighbourhood ends at the border and a fit is one-sided.
 """
@@ -30,7 +30,9 @@ from quadcurv.schemes import Curvatures, Fit, StandardErrors
 from quadcurv.stencils import Stencils
 from quadcurv.types import Bools, Floats, Indices, Ints
 
-_GHOST_DEGREE, _GHOST_LAYERS = 5, 2
+_GHOST_DEGREE, _GHOST_LAYERS = 5, 3
+_ROUND = 1  # of jet.KINDS, which is not loaded before it is needed
+_ROUNDING = 2.0**-49  # of positions, and of what is computed from them
 # Of one fit, in vertices of the finite-volume scheme.
 _WORK = 30
 
@@ -68,14 +70,20 @@ class MeshNeighbourhoods:
         self.wanted = self.present & self.stencils.closed if boundary == "nan" else self.present
         # Standard error of H and noise by surfaces fitted at the border: points read off these show none.
         self.border_error, self.border_noise = np.full((2, self.stencils.n), np.nan)
+        x = self.stencils.points
+        self.rounding = _ROUNDING * float(np.abs(x[np.isfinite(x)]).max(initial=0.0))
 
-    def polynomials(self, vertices: Indices, degree: int, rings: int, ghosts: bool = True) -> Floats:
+    def polynomials(
+        self, vertices: Indices, degree: int, rings: int, ghosts: bool = True, kind: int = 0
+    ) -> Floats:
         """(k, COLUMNS): see `Neighbourhoods`."""
-        out = (self._windows or self._faces).polynomials(vertices, degree, rings)
+        # Windows have the normals of their rings alone.
+        own = self._faces if self._windows is None or kind == _ROUND else self._windows
+        out = own.polynomials(vertices, degree, rings, kind)
         for faces, place, reach in (*(self._beyond(rings) if ghosts else ()), *self._at_poles(rings)):
             at = place[vertices]
             once, again = np.unique(at[at >= 0], return_inverse=True)  # all points of a pole are one vertex
-            out[at >= 0] = faces.polynomials(once, degree, reach)[again]
+            out[at >= 0] = faces.polynomials(once, degree, reach, kind)[again]
         return out
 
     def positions(self, vertices: Indices, rings: int) -> tuple[Floats, Floats]:
@@ -87,6 +95,21 @@ class MeshNeighbourhoods:
             out = _replaced(out, kept, faces.positions(at[kept], reach))
             normals[kept] = faces.normals[at[kept]]
         return out, normals
+
+    def pooled(self, values: Floats) -> Floats:
+        """(n, k): see `Neighbourhoods`."""
+        known = np.isfinite(values)
+        count = self._adjacency @ known.astype(np.float64)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            return self._adjacency @ np.where(known, values, 0.0) / count
+
+    @cached_property
+    def _adjacency(self) -> scipy.sparse.csr_array:
+        """(n, n): 1 between vertices of one face."""
+        incidence, n = self._faces._incidence[:, : self.stencils.n].astype(np.float64), self.stencils.n
+        near = (incidence.T @ incidence).tocsr()
+        near.data[:] = 1.0
+        return near[:n, :n]
 
     def lattice(self, layers: int) -> Floats:
         """(r + 2 layers, c + 2 layers, 3): see `Neighbourhoods`."""
@@ -168,7 +191,7 @@ class _GridNeighbourhoods:
     def __init__(self, grid: QuadGrid, stencils: Stencils) -> None:
         self.grid, self.normals = grid, stencils.ring_areas.reshape(grid.points.shape)
 
-    def polynomials(self, vertices: Indices, degree: int, rings: int) -> Floats:
+    def polynomials(self, vertices: Indices, degree: int, rings: int, kind: int) -> Floats:
         from quadcurv.kernels import jet
 
         at = np.stack(np.divmod(vertices, self.grid.shape[1]), axis=1) + rings
@@ -176,7 +199,7 @@ class _GridNeighbourhoods:
         for axis, wraps in enumerate(self.grid.wrap):
             points, normals = (_padded(x, axis, wraps, rings) for x in (points, normals))
         return _over(
-            lambda v, out: jet.grid_fits(points, normals, v, degree, rings, out), at.astype(np.int32)
+            lambda v, out: jet.grid_fits(points, normals, v, degree, rings, kind, out), at.astype(np.int32)
         )
 
 
@@ -214,17 +237,27 @@ class _FaceNeighbourhoods:
             normals[v] = stencils.ring_areas[np.unique(around)].sum(axis=0)
         return normals
 
-    def polynomials(self, vertices: Indices, degree: int, rings: int) -> Floats:
+    def polynomials(self, vertices: Indices, degree: int, rings: int, kind: int) -> Floats:
         from quadcurv.kernels import jet
 
-        s, (indptr, corners), normals = self.stencils, self.corners, self.normals
+        s, (indptr, corners) = self.stencils, self.corners
+        normals = self._averaged if kind == _ROUND else self.normals
 
         def fits(vertices: Ints, out: Floats) -> None:
             jet.face_fits(
-                s.points, s.faces, indptr, corners, normals, s.orientable, vertices, degree, rings, out
+                s.points, s.faces, indptr, corners, normals, s.orientable, vertices, degree, rings, kind, out
             )
 
         return _over(fits, vertices.astype(np.int32))
+
+    @cached_property
+    def _averaged(self) -> Floats:
+        """(n, 3): normals over two rings more, of which noise leaves a fifth."""
+        incidence = self._incidence[:, : len(self.normals)].astype(np.float64)
+        normals = self.normals
+        for _ in range(2):
+            normals = incidence.T @ (incidence @ normals)
+        return normals
 
     @cached_property
     def _incidence(self) -> scipy.sparse.csr_array:
@@ -275,9 +308,10 @@ def _continued(stencils: Stencils, layers: int) -> list[_Beyond]:
         return []
     points = np.concatenate((part.points, layer.points))
     faces = np.concatenate((part.faces, layer.quads))
-    unsure = np.flatnonzero(np.isfinite(layer.error) & ~layer.smooth)
     closed = part.closed | layer.smooth
-    closed[unsure] = layer.error[unsure] <= fitted(part, unsure).error
+    if layers < _GHOST_LAYERS:  # what is looked at from far away must be right beyond doubt
+        unsure = np.flatnonzero(np.isfinite(layer.error) & ~layer.smooth)
+        closed[unsure] = layer.error[unsure] <= fitted(part, unsure).error
     ghosted = Stencils(points, faces, part.shape, closed, part.orientable)
     near = np.arange(len(points)) >= part.n
     bad = np.zeros(len(points), bool)
@@ -393,10 +427,11 @@ def _turned(found: Curvatures, turn: Bools) -> Curvatures:
 
     k1, k2 = swapped(found.k1, found.k2)
     direction1, direction2 = swapped(found.direction1, found.direction2)
-    errors = found.standard_error
-    if errors is not None:
-        errors = StandardErrors(errors.mean, errors.gaussian, *swapped(errors.k1, errors.k2))
+    errors, bars = (
+        None if x is None else StandardErrors(x.mean, x.gaussian, *swapped(x.k1, x.k2))
+        for x in (found.standard_error, found.interval)
+    )
     return Curvatures(
         signed(found.mean), found.gaussian, signed(k1), signed(k2), direction1, direction2,
-        signed(found.normal), errors, found.noise, found.degree, found.rings,
+        signed(found.normal), errors, bars, found.noise, found.degree, found.rings,
     )  # fmt: skip

@@ -6,7 +6,12 @@ moments (an affine map, under which the polynomials stay what they are): the con
 the shape of the neighbourhood alone, neither on its size nor on its stretching. The normal equations
 are those of the moments sum x^a y^b, 45 numbers for degree 4. Their terms are eliminated highest degree
 first, so that what the curvature needs (c10, c01, c20, c11, c02) comes last: the last block of the
-Cholesky factor gives it, and its covariance, without the others.
+Cholesky factor gives it without the others. The very last term is the constant one: less its row
+the factor is that of fits through the vertex.
+
+Three KINDS of fits: PLAIN ones; ROUND ones, over the sphere instead of the plane (see `gather`); SMOOTH ones,
+round, through the vertex, and with weights (1 - r^2)^4 that fall to nearly nothing at the rim (Jiao and
+Zha 2008 interpolate and weigh): of these bias is least, of the others noise.
 
 LANES fits go through every step together, the innermost loops running over them: what there is of every fit
 lies in rows of LANES numbers.
@@ -18,29 +23,39 @@ import numpy as np
 
 from quadcurv.kernels.compiled import flat, kernel
 from quadcurv.kernels.formulas import real, root, span, where
-from quadcurv.kernels.gather import BLOCKS, LANES, neighbourhoods, step, windows
+from quadcurv.kernels.gather import BLOCKS, FARTHEST, LANES, ROWS, neighbourhoods, step, windows
 from quadcurv.kernels.vector import triple
 
+PLAIN, ROUND, SMOOTH = KINDS = range(3)
 # Below this part of a term's square nothing is left but rounding.
 PIVOT = 1e-9
+# Where weights vanish, in squares of the neighbourhood's radius.
+RIM = 1.44
 # Columns of a result.
 MEAN, GAUSSIAN, K1, K2 = 0, 1, 2, 3
 DIRECTION1, DIRECTION2, NORMAL = slice(4, 7), slice(7, 10), slice(10, 13)
-SIGMA, ERROR, CONDITION, COLUMNS = 13, 14, 18, 19  # ERROR: four of them
-# Seen from the other side: H -> -H, k1 -> -k2.
-TURNED = np.array([0, 1, 3, 2, 7, 8, 9, 4, 5, 6, 10, 11, 12, 13, 14, 15, 17, 16, 18])
-SIGNS = np.array([-1.0, 1, -1, -1, 1, 1, 1, 1, 1, 1, -1, -1, -1, 1, 1, 1, 1, 1, 1])
+# GAIN, BIAS: four of them.
+SIGMA, GAIN, CONDITION, BIAS, SQUARE, FREEDOM, LOWER, COLUMNS = 13, 14, 18, 19, 23, 24, 25, 26
 
-# Rows of `lane`: the axes of the frame; sums of x^2, x y, y^2, z^2 and of weights; the affine map
-# x = xx x', y = yx x' + yy y'; what of a term's square the terms before it left, at least; an inverse.
-AXES, SXX, SXY, SYY, SZZ, SW = (k * LANES for k in (0, 9, 10, 11, 12, 13))
-XX, YX, YY, LEAST, INVERSE = (k * LANES for k in (14, 15, 16, 17, 18))
+# Rows of `lane`: the axes of the frame; sums of x^2, x y, y^2, w z^2 and of weights; the affine map
+# x = xx x', y = yx x' + yy y'; what of a term's square the terms before it left, at least; what is left of
+# the squares of z; the largest x'^2 + y'^2; the number of points; what is left with fewer terms; sums of the
+# points' parts in the last coefficients and of their products.
+AXES, BEND, SXX, SXY, SYY, SZZ, SW = (k * LANES for k in (0, 9, 10, 11, 12, 13, 14))
+XX, YX, YY, LEAST, LEFT, FAR, COUNT, LESS = (k * LANES for k in (15, 16, 17, 18, 19, 20, 21, 22))
+SPREAD, ROWS_OF_LANE = 23 * LANES, 32
 
 
 def terms_of(degree):
-    """Exponents of the terms in the order of their elimination: x, y, x^2, x y, y^2 last."""
+    """Exponents of the terms in the order of their elimination: x, y, x^2, x y, y^2, 1 last."""
+    low = [(1, 0), (0, 1), (2, 0), (1, 1), (0, 2)]
     higher = [(d - b, b) for d in range(degree, 2, -1) for b in range(d + 1)]
-    return [*higher, (0, 0), (1, 0), (0, 1), (2, 0), (1, 1), (0, 2)]
+    return [*higher, *(term for term in low if sum(term) <= degree), (0, 0)]
+
+
+def count_of(degree):
+    """Of terms."""
+    return (degree + 1) * (degree + 2) // 2
 
 
 def workspace(degree):
@@ -48,33 +63,38 @@ def workspace(degree):
 
     Returns
     -------
-    lane, px, py, mu, nu, A
+    lane, px, py, mu, nu, A, G
         Rows: see above; powers of x and y; moments and those with z; the Cholesky factor, with the
-        right-hand side as its last row.
-    products, entries
+        right-hand side as its last row; what the last three of the terms before 1 are of the points.
+    products, entries, terms
         Rows (mu, px, py) of moments, those with z last; rows (A, mu) of the normal equations, the right-hand
-        side last, (A, nu).
+        side last, (A, nu), first those of two degrees less; rows (px, py) of the terms.
     """
-    terms, top, T = terms_of(degree), 2 * degree, (degree + 1) * (degree + 2) // 2
+    top, T = 2 * degree, count_of(degree)
     moments = [(a, b) for b in range(top + 1) for a in range(top + 1 - b)]
     with_z = [(a, b) for b in range(degree + 1) for a in range(degree + 1 - b)]
     products = [(k, a, b) for table in (moments, with_z) for k, (a, b) in enumerate(table)]
-    entries = [
-        (i * T + j, moments.index((terms[i][0] + terms[j][0], terms[i][1] + terms[j][1])))
-        for i in range(T)
-        for j in range(i + 1)
-    ]
-    entries += [(T * T + i, with_z.index(term)) for i, term in enumerate(terms)]
-    rows = (19, top + 1, top + 1, len(moments), len(with_z), (T + 1) * T)
+    entries = []
+    for d in (degree - 2, degree):
+        terms, t = terms_of(d), count_of(d)
+        entries += [
+            (i * t + j, moments.index((terms[i][0] + terms[j][0], terms[i][1] + terms[j][1])))
+            for i in range(t)
+            for j in range(i + 1)
+        ]
+        entries += [(t * t + i, with_z.index(term)) for i, term in enumerate(terms)]
+    rows = (ROWS_OF_LANE, top + 1, top + 1, len(moments), len(with_z), (T + 1) * T, 3 * T)
     scratch = (np.zeros(count * LANES) for count in rows)
-    return *scratch, flat(products, np.int32), flat(entries, np.int32)
+    tables = products, entries, terms_of(degree)
+    return *scratch, *(flat(table, np.int32) for table in tables)
 
 
 @step()
 def frames(normals, block, lane):
     """Unit normals and, after Duff et al. 2017, bases of their planes without a branch."""
     for k in span(0, LANES):
-        nx, ny, nz = triple(normals, 3 * block * LANES + k, LANES)
+        i = 4 * block * LANES + k
+        nx, ny, nz = triple(normals, i, LANES)
         length = root(nx * nx + ny * ny + nz * nz)
         nx, ny, nz = nx / length, ny / length, nz / length
         sign = where(nz >= 0, 1.0, -1.0)
@@ -83,15 +103,16 @@ def frames(normals, block, lane):
         axes = 1.0 + sign * nx * nx * a, sign * b, -sign * nx, b, sign + ny * ny * a, -ny, nx, ny, nz
         for row, x in enumerate(axes):
             lane[AXES + row * LANES + k] = x
-        for row in (SXX, SXY, SYY, SZZ, SW):
+        lane[BEND + k] = normals[i + 3 * LANES]
+        for row in (SXX, SXY, SYY, SZZ, SW, COUNT, FAR):
             lane[row + k] = 0.0
 
 
 @step()
 def into_frames(P, m, lane):
-    """Turn row m of neighbourhoods into their frames; sum its moments."""
+    """Turn row m of neighbourhoods into their frames, and spheres into planes; sum its moments."""
     for k in span(0, LANES):
-        i = 4 * m * LANES + k
+        i = ROWS * m * LANES + k
         dx, dy, dz = triple(P, i, LANES)
         x, y, z = (
             lane[AXES + r * LANES + k] * dx
@@ -99,41 +120,71 @@ def into_frames(P, m, lane):
             + lane[AXES + (r + 2) * LANES + k] * dz
             for r in (0, 3, 6)
         )
-        P[i], P[i + LANES], P[i + 2 * LANES] = x, y, z
-        for row, value in ((SXX, x * x), (SXY, x * y), (SYY, y * y), (SZZ, z * z)):
+        bend, square = lane[BEND + k], x * x + y * y + z * z
+        share = 1.0 + bend * z + bend * bend * square / 4
+        # Nothing is seen of what lies next to the opposite point of the sphere.
+        known = where(share > FARTHEST, P[i + 3 * LANES], 0.0)
+        inverse = where(share > FARTHEST, 1.0 / share, 0.0)
+        x, y, z = x * inverse, y * inverse, (z + bend * square / 2) * inverse
+        P[i], P[i + LANES], P[i + 2 * LANES], P[i + 3 * LANES] = x, y, z, known
+        for row, value in ((SXX, x * x), (SXY, x * y), (SYY, y * y), (COUNT, known)):
             lane[row + k] += value
-        lane[SW + k] += P[i + 3 * LANES]
 
 
 @step()
 def affine_maps(lane):
     """Maps that make second moments unit ones."""
     for k in span(0, LANES):
-        weight = lane[SW + k]
-        xx = root(lane[SXX + k] / weight)
-        yx = lane[SXY + k] / (weight * xx)
-        square = lane[SYY + k] / weight - yx * yx
+        count = lane[COUNT + k]
+        xx = root(lane[SXX + k] / count)
+        yx = lane[SXY + k] / (count * xx)
+        square = lane[SYY + k] / count - yx * yx
         lane[XX + k], lane[YX + k], lane[YY + k] = xx, yx, root(where(square < 0, 0.0, square))
         lane[LEAST + k] = 1.0
 
 
 @step()
-def first_powers(P, m, lane, px, py):
-    """Powers 0 and 1 of x, the same of y times the weight."""
+def into_maps(P, m, lane):
+    """Apply them; the farthest point."""
     for k in span(0, LANES):
-        i = 4 * m * LANES + k
-        weight, x = P[i + 3 * LANES], P[i] / lane[XX + k]
-        px[k], px[LANES + k] = 1.0, x
-        py[k], py[LANES + k] = weight, (P[i + LANES] - lane[YX + k] * x) / lane[YY + k]
+        i = ROWS * m * LANES + k
+        x = P[i] / lane[XX + k]
+        y = (P[i + LANES] - lane[YX + k] * x) / lane[YY + k]
+        P[i], P[i + LANES] = x, y
+        far, square = lane[FAR + k], x * x + y * y
+        lane[FAR + k] = where(square > far, square, far)
 
 
 @step()
-def next_powers(px, py, a):
+def weigh(P, m, lane, weighted):
+    """Weights, their sum, and that of the squares of z."""
+    for k in span(0, LANES):
+        i = ROWS * m * LANES + k
+        known, square = P[i + 3 * LANES], P[i] * P[i] + P[i + LANES] * P[i + LANES]
+        w = 1.0 - square / (RIM * lane[FAR + k])
+        w = known * where(weighted, w * w * w * w, 1.0)
+        P[i + 3 * LANES] = w
+        lane[SW + k] += w
+        lane[SZZ + k] += w * P[i + 2 * LANES] * P[i + 2 * LANES]
+
+
+@step()
+def first_powers(P, m, px, py):
+    """Powers 0 and 1 of x, the same of y times the weight."""
+    for k in span(0, LANES):
+        i = ROWS * m * LANES + k
+        weight = P[i + 3 * LANES]
+        px[k], px[LANES + k] = 1.0, P[i]
+        py[k], py[LANES + k] = weight, weight * P[i + LANES]
+
+
+@step()
+def next_powers(P, m, px, py, a):
     """Power a of x and y."""
     for k in span(0, LANES):
-        i = a * LANES + k
-        px[i] = px[i - LANES] * px[LANES + k]
-        py[i] = py[i - LANES] * py[LANES + k]
+        i, j = a * LANES + k, ROWS * m * LANES + k
+        px[i] = px[i - LANES] * P[j]
+        py[i] = py[i - LANES] * P[j + LANES]
 
 
 @step()
@@ -145,9 +196,9 @@ def add_moment(sums, px, py, products, t):
 
 
 @step()
-def clear(rows, count):
+def clear(rows, first, count):
     """Make rows zero."""
-    for k in span(0, count * LANES):
+    for k in span(first * LANES, (first + count) * LANES):
         rows[k] = 0.0
 
 
@@ -155,7 +206,7 @@ def clear(rows, count):
 def powers_with_z(P, m, py, b):
     """Multiply a power of y by z."""
     for k in span(0, LANES):
-        py[b * LANES + k] *= P[(4 * m + 2) * LANES + k]
+        py[b * LANES + k] *= P[(ROWS * m + 2) * LANES + k]
 
 
 @step()
@@ -168,20 +219,28 @@ def put_entry(A, mu, nu, without_z, entries, t):
 
 
 @step()
+def begin(lane):
+    """Keep what fewer terms left of the squares of z, and begin with all of them."""
+    for k in span(0, LANES):
+        lane[LESS + k] = lane[LEFT + k]
+        lane[LEFT + k] = lane[SZZ + k]
+
+
+@step()
 def pivot(A, lane, mu, diagonal, moment):
-    """How much of a term's square is left, of 1; the inverse of its root."""
+    """How much of a term's square is left, of 1; the inverse of its root, in its place."""
     for k in span(0, LANES):
         left = A[diagonal * LANES + k]
         share, least = left / mu[moment * LANES + k], lane[LEAST + k]
         lane[LEAST + k] = where(share < least, share, least)
-        lane[INVERSE + k] = 1.0 / root(left)
+        A[diagonal * LANES + k] = 1.0 / root(left)
 
 
 @step()
-def scale_entry(A, lane, i):
+def scale_entry(A, i, diagonal):
     """An entry of the factor."""
     for k in span(0, LANES):
-        A[i * LANES + k] *= lane[INVERSE + k]
+        A[i * LANES + k] *= A[diagonal * LANES + k]
 
 
 @step()
@@ -196,7 +255,47 @@ def explain(A, lane, i):
     """Take from the squares of z what the term that is eliminated explains of them."""
     for k in span(0, LANES):
         x = A[i * LANES + k]
-        lane[SZZ + k] -= x * x
+        lane[LEFT + k] -= x * x
+
+
+@step()
+def unit_row(A, G, i, diagonal):
+    """Begin a row of an inverse with its diagonal."""
+    for k in span(0, LANES):
+        G[i * LANES + k] = A[diagonal * LANES + k]
+
+
+@step()
+def combine(A, G, i, j, entry):
+    """Take from an entry of an inverse what another one makes of it."""
+    for k in span(0, LANES):
+        G[i * LANES + k] -= A[entry * LANES + k] * G[j * LANES + k]
+
+
+@step()
+def scale_inverse(A, G, i, diagonal):
+    """An entry of an inverse."""
+    for k in span(0, LANES):
+        G[i * LANES + k] *= A[diagonal * LANES + k]
+
+
+@step()
+def add_term(G, px, py, terms, T, t, mu):
+    """What one term adds to the parts that a point has in the last three coefficients."""
+    a, b = terms[2 * t] * LANES, terms[2 * t + 1] * LANES
+    for k in span(0, LANES):
+        x = px[a + k] * py[b + k]
+        for j in range(3):
+            mu[j * LANES + k] += G[(j * T + t) * LANES + k] * x
+
+
+@step()
+def spread(lane, mu):
+    """Add the parts of a point, and their products."""
+    for k in span(0, LANES):
+        u, v, w = (mu[j * LANES + k] for j in range(3))
+        for row, x in enumerate((u, v, w, u * u, u * v, v * v, u * w, v * w, w * w)):
+            lane[SPREAD + row * LANES + k] += x
 
 
 @step()
@@ -213,36 +312,54 @@ def unknown(out, at, condition):
 
 
 @step()
-def result(A, lane, T, k, out, at):
+def result(A, lane, T, through, k, out, at):
     """All results of the k-th fit."""
-    # The last rows and columns of the Cholesky factor, (6, 5), the right-hand side last.
-    B = {(i, j): A[((T - 5 + i) * T + T - 5 + j) * LANES + k] for i in range(6) for j in range(5) if j <= i}
+    # The last rows and columns of the Cholesky factor, (7, 6), the right-hand side last; inverses on its
+    # diagonal.
+    B = {(i, j): A[((T - 6 + i) * T + T - 6 + j) * LANES + k] for i in range(7) for j in range(6) if j <= i}
     frame = [lane[AXES + row * LANES + k] for row in range(9)]
-    weight = lane[SW + k]
-    freedom, square = weight - real(T), lane[SZZ + k]
-    sigma = where(freedom > 0, root(where(square < 0, 0.0, square) / freedom), nan)
-    values, errors = curvatures(B, lane[XX + k], lane[YX + k], lane[YY + k], frame)
-    errors = [error * sigma for error in errors]
-    for column, x in enumerate((*values, sigma, *errors, sensitivity(B) * root(weight))):
+    maps = lane[XX + k], lane[YX + k], lane[YY + k], lane[BEND + k]
+    count = lane[COUNT + k]
+    square, constant = where(lane[LEFT + k] < 0, 0.0, lane[LEFT + k]), B[6, 5] * B[5, 5]
+    # Points less the terms, weighted ones for as much as they count.
+    freedom = count - real(T)
+    sigma = where(freedom > 0, root(square / freedom), nan)
+    sums = [lane[SPREAD + row * LANES + k] for row in range(9)]
+    # A vertex that all pass through is in the other points, turned round.
+    S = [
+        where(through, x + sums[i] * sums[j], y)
+        for x, y, (i, j) in zip(sums[3:], variances(B), INDICES, strict=True)
+    ]
+    values, gains = curvatures(B, where(through, 0.0, constant), *maps, frame, S)
+    others, _ = curvatures(B, where(through, constant, 0.0), *maps, frame, S)
+    bias = (b - a for a, b in zip(values[:4], others[:4], strict=True))
+    condition = where(count > 0, root((S[0] + S[2] + S[5]) * count), nan)
+    for column, x in enumerate((*values, sigma, *gains, condition, *bias, square, freedom, lane[LESS + k])):
         out[at * COLUMNS + column] = x
 
 
-def sensitivity(B):
-    """How errors in z pass on to the second-order terms: the root of the sum of their variances."""
-    b00, b11, b22 = 1 / B[2, 2], 1 / B[3, 3], 1 / B[4, 4]
-    b10 = -B[3, 2] * b00 * b11
-    b21 = -B[4, 3] * b11 * b22
-    b20 = -(B[4, 2] * b00 + B[4, 3] * b10) * b22
-    return root(b00 * b00 + b10 * b10 + b20 * b20 + b11 * b11 + b21 * b21 + b22 * b22)
+def variances(B):
+    """Those of the last three coefficients before the constant one, and their covariances, for sigma = 1."""
+    rows = []  # of the inverse of the factor, transposed
+    for j in range(2, 5):
+        row = {j: B[j, j]}
+        for i in range(j + 1, 6):
+            row[i] = -sum(B[i, k] * row[k] for k in range(j, i)) * B[i, i]
+        rows.append(row)
+    return [sum(rows[i][k] * rows[j][k] for k in rows[j]) for i, j in INDICES]
 
 
-def curvatures(B, xx, yx, yy, frame):
+INDICES = (0, 0), (0, 1), (1, 1), (0, 2), (1, 2), (2, 2)
+
+
+def curvatures(B, constant, xx, yx, yy, bend, frame, S):
     """The first 13 columns of a result, and the standard errors of four of them for sigma = 1."""
-    c02 = B[5, 4] / B[4, 4]
-    c11 = (B[5, 3] - B[4, 3] * c02) / B[3, 3]
-    c20 = (B[5, 2] - B[3, 2] * c11 - B[4, 2] * c02) / B[2, 2]
-    c01 = (B[5, 1] - B[2, 1] * c20 - B[3, 1] * c11 - B[4, 1] * c02) / B[1, 1]
-    c10 = (B[5, 0] - B[1, 0] * c01 - B[2, 0] * c20 - B[3, 0] * c11 - B[4, 0] * c02) / B[0, 0]
+    right = [B[6, j] - B[5, j] * constant for j in range(5)]
+    c02 = right[4] * B[4, 4]
+    c11 = (right[3] - B[4, 3] * c02) * B[3, 3]
+    c20 = (right[2] - B[3, 2] * c11 - B[4, 2] * c02) * B[2, 2]
+    c01 = (right[1] - B[2, 1] * c20 - B[3, 1] * c11 - B[4, 1] * c02) * B[1, 1]
+    c10 = (right[0] - B[1, 0] * c01 - B[2, 0] * c20 - B[3, 0] * c11 - B[4, 0] * c02) * B[0, 0]
 
     # d/dx = al d/dx' + be d/dy', d/dy = ga d/dy'.
     al, be, ga = 1 / xx, -yx / (xx * yy), 1 / yy
@@ -251,12 +368,13 @@ def curvatures(B, xx, yx, yy, frame):
     zxy = ga * (al * c11 + 2 * be * c02)
     zyy = 2 * ga * ga * c02
 
-    # Shape operator ((a, b), (b, c)) in the basis e1 = (1, 0, p) / e, e2 = (-p q, e^2, q) / (e W).
+    # Shape operator ((a, b), (b, c)) in the basis e1 = (1, 0, p) / e, e2 = (-p q, e^2, q) / (e W), and the
+    # sphere's.
     e2 = 1 + p * p
     e, W = root(e2), root(e2 + q * q)
-    a = -zxx / (e2 * W)
+    a = bend / W - zxx / (e2 * W)
     b = -(e2 * zxy - p * q * zxx) / (e2 * W * W)
-    c = -(p * p * q * q * zxx - 2 * p * q * e2 * zxy + e2 * e2 * zyy) / (e2 * W * W * W)
+    c = bend / W - (p * p * q * q * zxx - 2 * p * q * e2 * zxy + e2 * e2 * zyy) / (e2 * W * W * W)
     half, H = (a - c) / 2, (a + c) / 2
     size = root(half * half + b * b)
     # Half the angle of (half, b), the larger of cosine and sine first.
@@ -283,58 +401,91 @@ def curvatures(B, xx, yx, yy, frame):
         dxx = -da / (e2 * W) + db * p * q / (e2 * W * W) - dc * p * p * q * q / (e2 * W * W * W)
         dxy = -db / (W * W) + dc * 2 * p * q / (W * W * W)
         dyy = -dc * e2 / (W * W * W)
-        d20 = 2 * al * al * dxx
-        d11 = 2 * al * be * dxx + ga * al * dxy
-        d02 = 2 * be * be * dxx + 2 * ga * be * dxy + 2 * ga * ga * dyy
-        u = d20 / B[2, 2]
-        v = (d11 - B[3, 2] * u) / B[3, 3]
-        w = (d02 - B[4, 2] * u - B[4, 3] * v) / B[4, 4]
-        errors.append(root(u * u + v * v + w * w))
+        u = 2 * al * al * dxx
+        v = 2 * al * be * dxx + ga * al * dxy
+        w = 2 * be * be * dxx + 2 * ga * be * dxy + 2 * ga * ga * dyy
+        square = u * u * S[0] + v * v * S[2] + w * w * S[5]
+        square += 2 * (u * v * S[1] + u * w * S[3] + v * w * S[4])
+        errors.append(root(where(square < 0, 0.0, square)))
     return (H, a * c - b * b, H + size, H - size, *first, *second, *normal), errors
 
 
 @kernel
-def _fit(P, counts, normals, degree, out, size, lane, px, py, mu, nu, A, products, entries):
+def _fit(P, counts, normals, degree, smooth, out, size, lane, px, py, mu, nu, A, G, products, entries, terms):
     T = (degree + 1) * (degree + 2) // 2
-    moments, normal, room = (degree + 1) * (2 * degree + 1), T * (T + 1) // 2, P.size // (4 * LANES * BLOCKS)
+    moments, room = (degree + 1) * (2 * degree + 1), P.size // (ROWS * LANES * BLOCKS)
     for block in range(counts.size):
         first, last = block * room, block * room + counts[block]
         frames(normals, block, lane)
         for m in range(first, last):
             into_frames(P, m, lane)
         affine_maps(lane)
-        clear(mu, moments)
-        clear(nu, T)
         for m in range(first, last):
-            first_powers(P, m, lane, px, py)
+            into_maps(P, m, lane)
+        for m in range(first, last):
+            weigh(P, m, lane, smooth == 1)
+        clear(mu, 0, moments)
+        clear(nu, 0, T)
+        for m in range(first, last):
+            first_powers(P, m, px, py)
             for a in range(2, 2 * degree + 1):
-                next_powers(px, py, a)
+                next_powers(P, m, px, py, a)
             for t in range(moments):
                 add_moment(mu, px, py, products, t)
             for b in range(degree + 1):
                 powers_with_z(P, m, py, b)
             for t in range(moments, moments + T):
                 add_moment(nu, px, py, products, t)
-        for t in range(normal + T):
-            put_entry(A, mu, nu, t < normal, entries, t)
-        diagonal = 0
-        for k in range(T):
-            pivot(A, lane, mu, k * T + k, entries[2 * diagonal + 1])
-            diagonal += k + 2
-            for i in range(k, T + 1):
-                scale_entry(A, lane, i * T + k)
-            for i in range(k + 1, T + 1):
-                for j in range(k + 1, min(i, T - 1) + 1):
-                    eliminate(A, i * T + j, i * T + k, j * T + k)
-            explain(A, lane, T * T + k)
+
+        at = 0  # of the entries
+        for d in range(degree - 2, degree + 1, 2):
+            n = (d + 1) * (d + 2) // 2
+            normal = n * (n + 1) // 2
+            for t in range(normal + n):
+                put_entry(A, mu, nu, t < normal, entries, at + t)
+            begin(lane)
+            diagonal = at
+            for k in range(n):
+                pivot(A, lane, mu, k * n + k, entries[2 * diagonal + 1])
+                diagonal += k + 2
+                for i in range(k + 1, n + 1):
+                    scale_entry(A, i * n + k, k * n + k)
+                for i in range(k + 1, n + 1):
+                    for j in range(k + 1, min(i, n - 1) + 1):
+                        eliminate(A, i * n + j, i * n + k, j * n + k)
+                explain(A, lane, n * n + k)
+            at += normal + n
+
+        if smooth:  # of least squares without weights the factor tells all
+            clear(G, 0, 3 * T)
+            for j in range(3):
+                q = T - 4 + j
+                unit_row(A, G, j * T + q, q * T + q)
+                for i in range(q + 1, T - 1):
+                    for k in range(q, i):
+                        combine(A, G, j * T + i, j * T + k, i * T + k)
+                    scale_inverse(A, G, j * T + i, i * T + i)
+                for i in range(T - 2, -1, -1):
+                    for k in range(i + 1, T - 1):
+                        combine(A, G, j * T + i, j * T + k, k * T + i)
+                    scale_inverse(A, G, j * T + i, i * T + i)
+            clear(lane, SPREAD // LANES, 9)
+            for m in range(first, last):
+                first_powers(P, m, px, py)
+                for a in range(2, degree + 1):
+                    next_powers(P, m, px, py, a)
+                clear(mu, 0, 3)
+                for t in range(T - 1):
+                    add_term(G, px, py, terms, T, t, mu)
+                spread(lane, mu)
         for k in range(min(LANES, size - block * LANES)):
             if is_determined(lane, k):
-                result(A, lane, T, k, out, block * LANES + k)
+                result(A, lane, T, smooth == 1, k, out, block * LANES + k)
             else:
                 unknown(out, block * LANES + k, inf)
 
 
-def grid_fits(points, normals, vertices, degree, rings, out):
+def grid_fits(points, normals, vertices, degree, rings, kind, out):
     """Fit a grid's vertices over windows of 2 rings + 1 points in both directions.
 
     Parameters
@@ -347,23 +498,25 @@ def grid_fits(points, normals, vertices, degree, rings, out):
         Row and column in `points` of each vertex to fit.
     degree : int
     rings : int
+    kind : int
+        One of KINDS.
     out : (k, COLUMNS) float64
         Filled. With several rings all is NaN, the CONDITION too, where the neighbourhood is too steep; with
         any, all but the CONDITION, infinite then, where it does not determine the polynomial.
     """
     work, columns, room = workspace(degree), points.shape[1], (2 * rings + 1) ** 2
     points, normals = flat(points), flat(normals)
-    P, axes = np.empty(BLOCKS * room * 4 * LANES), np.empty(BLOCKS * 3 * LANES)
+    P, axes = np.empty(BLOCKS * room * ROWS * LANES), np.empty(BLOCKS * 4 * LANES)
     steep = np.empty(BLOCKS * LANES, bool)
     for start in range(0, len(vertices), BLOCKS * LANES):
         some, results = flat(vertices[start : start + BLOCKS * LANES]), out[start : start + BLOCKS * LANES]
         counts = np.empty(-(-len(results) // LANES), np.int64)
-        windows(points, normals, columns, some, rings, P, counts, axes, steep)
-        _fit(P, counts, axes, degree, results.reshape(-1), len(results), *work)
+        windows(points, normals, columns, some, rings, kind != PLAIN, P, counts, axes, steep)
+        _fit(P, counts, axes, degree, int(kind == SMOOTH), results.reshape(-1), len(results), *work)
         results[steep[: len(results)]] = np.nan
 
 
-def face_fits(points, faces, indptr, corners, normals, sided, vertices, degree, rings, out):
+def face_fits(points, faces, indptr, corners, normals, sided, vertices, degree, rings, kind, out):
     """Fit vertices of a face list over all vertices of `rings` rings of faces around them.
 
     Parameters
@@ -378,18 +531,20 @@ def face_fits(points, faces, indptr, corners, normals, sided, vertices, degree, 
         Whether they are all on the same side; if not, nobody knows what is too steep.
     vertices : (k,) int32
         Vertices to fit.
-    degree, rings, out
+    degree, rings, kind, out
         As for grid_fits.
     """
     stamp, around = np.full(len(points), -1, np.int32), np.empty(len(points), np.int32)
     given = [flat(x) for x in (points, faces, indptr, corners, normals)]
-    work, room, axes = workspace(degree), 32, np.empty(BLOCKS * 3 * LANES)
-    P = np.empty(BLOCKS * room * 4 * LANES)
+    work, room, axes = workspace(degree), 32, np.empty(BLOCKS * 4 * LANES)
+    P = np.empty(BLOCKS * room * ROWS * LANES)
     for start in range(0, len(vertices), BLOCKS * LANES):
         some, results = flat(vertices[start : start + BLOCKS * LANES]), out[start : start + BLOCKS * LANES]
         counts = np.empty(-(-len(results) // LANES), np.int64)
-        while (found := neighbourhoods(*given, sided, some, rings, P, counts, axes, stamp, around)) > room:
+        scratch = P, counts, axes, stamp, around
+        while (found := neighbourhoods(*given, sided, some, rings, kind != PLAIN, *scratch)) > room:
             stamp.fill(-1)
             room = 2 * found
-            P = np.empty(BLOCKS * room * 4 * LANES)
-        _fit(P, counts, axes, degree, results.reshape(-1), len(results), *work)
+            P = np.empty(BLOCKS * room * ROWS * LANES)
+            scratch = P, *scratch[1:]
+        _fit(P, counts, axes, degree, int(kind == SMOOTH), results.reshape(-1), len(results), *work)

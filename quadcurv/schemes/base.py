@@ -118,6 +118,9 @@ class Curvatures:
     standard_error : StandardErrors or None
         From the fit's residuals, for errors of the positions along the normal that are independent and
         of equal size: noise, not what a smooth surface leaves. NaN where a fit has no residuals.
+    interval : StandardErrors or None
+        Half widths of intervals about H, K, k1 and k2 that hold the exact values in 95 % of cases: the noise
+        by Student's t, and twice the bias as far as the fit knows of it. Of "jet" alone.
     noise : float64 or None
         Standard deviation of the positions along the normal, from the residuals, in length.
     degree, rings : int32 or None
@@ -139,6 +142,7 @@ class Curvatures:
     direction2: Floats
     normal: Floats
     standard_error: StandardErrors | None = None
+    interval: StandardErrors | None = None
     noise: Floats | None = None
     degree: Ints | None = None
     rings: Ints | None = None
@@ -180,6 +184,11 @@ class Neighbourhoods(Protocol):
     ----------
     present, wanted : (n,) bool
         Vertices of one fan of faces, open or closed; those of them that want a curvature.
+    border_error : (n,) float64
+        Error of H where a neighbourhood was completed by points of a surface fitted at the border, after
+        `polynomials` did it; NaN elsewhere.
+    rounding : float
+        Of the positions, in length.
     """
 
     @property
@@ -187,15 +196,25 @@ class Neighbourhoods(Protocol):
     @property
     def wanted(self) -> Bools: ...  # noqa: D102
 
-    def polynomials(self, vertices: Indices, degree: int, rings: int, ghosts: bool = True) -> Floats:
+    @property
+    def border_error(self) -> Floats: ...  # noqa: D102
+    @property
+    def rounding(self) -> float: ...  # noqa: D102
+
+    def polynomials(
+        self, vertices: Indices, degree: int, rings: int, ghosts: bool = True, kind: int = 0
+    ) -> Floats:
         """Least-squares polynomials of height over the tangent planes of vertices (k,), compiled.
 
         Returns
         -------
         (k, COLUMNS) float64
-            See :mod:`quadcurv.kernels.jet`. With `ghosts` neighbourhoods of up to two rings go on beyond
-            smooth borders; else, and over more rings, they end there.
+            See :mod:`quadcurv.kernels.jet`, also for the kinds of fits. With `ghosts` neighbourhoods of up to
+            three rings go on beyond smooth borders; else, and over more rings, they end there.
         """
+
+    def pooled(self, values: Floats) -> Floats:
+        """Means of values (n, k) over vertices and their neighbours, of those that are known."""
 
     def positions(self, vertices: Indices, rings: int) -> tuple[Floats, Floats]:
         """Positions around vertices (k,), for fits written in numpy.

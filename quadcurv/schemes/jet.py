@@ -8,12 +8,14 @@ from typing import Literal
 import numpy as np
 
 from quadcurv.schemes.base import Curvatures, Fit, Neighbourhoods, StandardErrors
+from quadcurv.schemes.chosen import chosen
 from quadcurv.types import Bools, Floats, Indices, Ints
 
 # Most that errors in height, of unit mean square, may grow to in the second derivatives, both in units of
 # the neighbourhood's extent: inside 2, 3 and 10 by degree; at the sides of a grid, where rings beyond the
 # least are needed, 5, 30 and 100.
-_CONDITION = {2: 20.0, 3: 60.0, 4: 220.0}
+_CONDITION = {2: 20.0, 3: 60.0, 4: 220.0, 6: 1000.0}
+_RINGS = {2: 1, 3: 2, 4: 2, 6: 3}
 _GROWTH = 3
 _MOST_RINGS = 64
 
@@ -25,29 +27,36 @@ _SAMPLE, _LEAST_SAMPLE = 3000, 100
 Run = Callable[[Indices, int, int], Floats]
 
 
-def jet(degree: int | Literal["auto"] = 4, rings: int | None = None) -> Fit:
+def jet(degree: int | Literal["auto"] | None = None, rings: int | None = None) -> Fit:
     """Polynomial of height over the tangent plane, by least squares over rings of neighbours.
 
     Parameters
     ----------
-    degree : {2, 3, 4} or "auto"
-        "auto" chooses degree and rings for the mesh at hand: those of the least error in the mean curvature
-        as far as the fits of a sample of vertices tell, noise by their standard errors and bias by
-        differences between fits.
+    degree : {2, 3, 4, 6} or "auto", optional
+        By default ("jet") chosen vertex by vertex, with rings and weights: where the surface is resolved a
+        polynomial of degree 6 over three rings and over the nearest sphere instead of the plane, through the
+        vertex and with weights that fall with the distance; where noise prevails plain least squares of
+        degree 4 or 6 over three rings; beside rough borders one-sided fits over more. "auto" chooses degree
+        and rings of plain fits for the whole mesh: those of the least error in the mean curvature as far as
+        the fits of a sample of vertices tell, noise by their standard errors and bias by differences between
+        fits.
     rings : int, optional
         Rings of faces around a vertex whose vertices are fitted, on a grid the window of
-        (2 rings + 1)^2 points. By default 1 for degree 2 and 2 for the others.
+        (2 rings + 1)^2 points. By default 1 for degree 2, 3 for degree 6 and 2 for the others.
 
     Returns
     -------
     Fit
-        H of order 4 with degree 4 and of order 2 with the others where neighbourhoods are nearly symmetric,
-        of order `degree` - 1 elsewhere.
+        The default's H is of order 6 where neighbourhoods are nearly symmetric and of order 5 elsewhere,
+        exact on spheres, and ``Curvatures.interval`` has its error bars.
+        With a degree, plain least squares as published: H of order 4 with degree 4, of order 6 with degree 6
+        and of order 2 with the others where neighbourhoods are nearly symmetric, of order `degree` - 1
+        elsewhere.
         Where the vertices of the rings do not determine the polynomial well, up to three more rings
         are taken, and if that does not help the degree is lowered. Where several rings are steeper than 2 : 1
         over the tangent plane, or fold over, fewer are taken. ``Curvatures.degree`` and ``.rings`` report
         all this; both are 0 where there is no result.
-        With boundary="extrapolate" as many ghost layers as rings, if these are no more than two,
+        With boundary="extrapolate" as many ghost layers as rings, if these are no more than three,
         are put around grids and face lists, by quintic extrapolation along strips of six points as
         :func:`quadcurv.one_rings` traces them: borders are then as good as the inside. Fits are one-sided
         where a strip is rough or cannot be traced.
@@ -61,6 +70,8 @@ def jet(degree: int | Literal["auto"] = 4, rings: int | None = None) -> Fit:
     ----------
     F. Cazals, M. Pouget (2005), Estimating differential quantities using polynomial fitting of
     osculating jets, Computer Aided Geometric Design 22, 121-146.
+    X. Jiao, H. Zha (2008), Consistent computation of first- and second-order differential quantities for
+    surface meshes, SPM 2008, 159-170: weights, and fits through the vertex.
 
     Examples
     --------
@@ -69,6 +80,10 @@ def jet(degree: int | Literal["auto"] = 4, rings: int | None = None) -> Fit:
     >>> cubic.name
     'jet-3'
     """
+    if degree is None:
+        if rings is not None:
+            raise ValueError(f"rings: chosen vertex by vertex without a degree, got {rings!r}")
+        return Fit("jet", 6, _REFERENCE, chosen)
     if degree == "auto":
         if rings is not None:
             raise ValueError(f'rings: chosen with degree "auto", got {rings!r}')
@@ -76,14 +91,13 @@ def jet(degree: int | Literal["auto"] = 4, rings: int | None = None) -> Fit:
     if not isinstance(degree, int) or degree not in _CONDITION:
         raise ValueError(f'degree: expected "auto" or one of {tuple(_CONDITION)}, got {degree!r}')
     if rings is None:
-        rings = 1 if degree == 2 else 2
+        rings = _RINGS[degree]
     elif not isinstance(rings, int | np.integer) or not 1 <= rings <= _MOST_RINGS:
         raise ValueError(f"rings: expected a whole number from 1 to {_MOST_RINGS}, got {rings!r}")
-    standard = (degree, rings) in ((2, 1), (3, 2), (4, 2))
-    name = "jet" if degree == 4 else f"jet-{degree}"
+    standard = rings == _RINGS[degree]
     return Fit(
-        name if standard else f"jet-{degree}-{rings}",
-        2 if degree < 4 else 4,
+        f"jet-{degree}" if standard else f"jet-{degree}-{rings}",
+        2 if degree < 4 else degree,
         _REFERENCE,
         lambda around: _curvatures(around, degree, rings),
     )
@@ -131,7 +145,7 @@ def _choice(vertices: Indices, run: Run) -> tuple[int, int]:
     if kept.sum() < _LEAST_SAMPLE:
         return _CANDIDATES[0]
     H = {c: f[kept, kernel.MEAN] for c, f in fits.items()}
-    gain2 = {c: (f[kept, kernel.ERROR] / f[kept, kernel.SIGMA]) ** 2 for c, f in fits.items()}
+    gain2 = {c: f[kept, kernel.GAIN] ** 2 for c, f in fits.items()}
     noise2 = np.mean(fits[next(iter(fits))][kept, kernel.SIGMA] ** 2)  # of the fewest rings
 
     bias: dict[tuple[int, int], float] = {}
@@ -148,7 +162,9 @@ def _choice(vertices: Indices, run: Run) -> tuple[int, int]:
             bias[c] = max(bias[c], np.sqrt(max(apart2 - chance, 0.0)) - bias[b])
 
     def risk(c: tuple[int, int]) -> float:
-        return float(np.nanmean(np.hypot(fits[c][:, kernel.ERROR], bias[c])))  # one-sided ones too
+        return float(
+            np.nanmean(np.hypot(fits[c][:, kernel.GAIN] * fits[c][:, kernel.SIGMA], bias[c]))
+        )  # one-sided ones too
 
     return min(fits, key=risk)
 
@@ -161,7 +177,7 @@ def _fits(wanted: Bools, run: Run, degree: int, rings: int) -> tuple[Floats, Int
     degrees, grown = np.zeros((2, wanted.size), np.int32)
     most = np.full(wanted.size, rings + _GROWTH)  # rings until it is too steep
     todo = np.flatnonzero(wanted)
-    for d in range(degree, 1, -1):
+    for d in (d for d in (6, 4, 3, 2) if d <= degree):
         for r in (*range(rings, rings + _GROWTH + 1), *range(rings - 1, 0, -1)):
             at = todo[(most[todo] >= r) & ((r >= rings) | (most[todo] < rings))]
             if at.size == 0:
@@ -190,7 +206,7 @@ def _unpacked(out: Floats, degree: Ints, rings: Ints) -> Curvatures:
         direction1=out[:, kernel.DIRECTION1],
         direction2=out[:, kernel.DIRECTION2],
         normal=out[:, kernel.NORMAL],
-        standard_error=StandardErrors(*(out[:, kernel.ERROR + k] for k in range(4))),
+        standard_error=StandardErrors(*(out[:, kernel.GAIN + k] * out[:, kernel.SIGMA] for k in range(4))),
         noise=out[:, kernel.SIGMA],
         degree=degree,
         rings=rings,

@@ -1,0 +1,230 @@
+"""Degree, rings and weights of fits chosen vertex by vertex, with error bars that know of noise and of bias.
+
+Where a neighbourhood resolves the surface, terms of higher degree explain nearly all that those of lower
+degree leave, and what is left says how far the fit is off: there a fit of degree 6 over three rings, through
+the vertex and with weights that fall with the distance, has the least error. Where they explain no more than
+chance does, the rest is noise: there plain least squares over as many points as the bias permits are best.
+Which of the two it is, an F test tells at every vertex.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from scipy.special import stdtrit
+
+from quadcurv.schemes.base import Curvatures, Neighbourhoods, StandardErrors
+from quadcurv.types import Bools, Floats, Indices
+
+# Degree, rings, and whether these go on beyond the border.
+_SIDES = ((6, 3, True), (6, 4, False), (6, 5, False), (4, 2, True), (4, 3, False), (4, 4, False))
+_LAST = (1, 2, 3, 4)  # rings of quadratic fits
+# Most that errors in height, of unit mean square, may grow to in the second derivatives, both in units of
+# the neighbourhood's extent; regular neighbourhoods have 40, 16 and 4.
+_CONDITION = {6: 500.0, 4: 160.0, 2: 40.0}
+_ONE_SIDED = {6: 1e4, 4: 1e3}
+# What noise leaves of its square in weighted residuals, and their degrees of freedom, both per point more
+# than terms: measured on quads and triangles, jittered or not, at valences 3 to 5.
+_LEFT = {6: (0.41, 0.67), 4: (0.31, 0.62), 2: (0.06, 0.57)}
+# Times what noise explains with as many terms, from which on terms are the surface's.
+_RESOLVED = 5.0
+# Degrees and rings where noise prevails.
+_WIDE = ((6, 3), (4, 3), (4, 4), (4, 5), (2, 3), (2, 4))
+_CHANCE = 0.2  # of the noise's square, that means over two rings of neighbours may be off
+_QUANTILE = 0.975
+_FAR = 6  # rings over which noise is looked for where all is steep
+
+
+class _Found:
+    """Results so far, vertex by vertex."""
+
+    def __init__(self, around: Neighbourhoods) -> None:
+        from quadcurv.kernels import jet as kernel
+
+        n = around.wanted.size
+        self.kernel = kernel
+        self.values = np.full((n, kernel.COLUMNS), np.nan)
+        self.degree, self.rings = np.zeros((2, n), np.int32)
+        self.sigma, self.freedom = np.full((2, n), np.nan)
+        self.bias = np.full((n, 4), np.nan)
+
+    def put(self, at: Indices, fits: Floats, d: int, r: int, beyond: Floats | float = 0.0) -> None:
+        """Results of smooth fits, H being off by so much for what is beyond a border."""
+        kernel, left = self.kernel, fits[:, self.kernel.FREEDOM]
+        share, part = _LEFT[d]
+        self.values[at], self.degree[at], self.rings[at] = fits, d, r
+        square = np.divide(
+            fits[:, kernel.SQUARE], share * left, out=np.full(len(fits), np.nan), where=left > 0
+        )
+        self.sigma[at], self.freedom[at] = np.sqrt(square), np.maximum(part * left, 1.0)
+        gain = fits[:, kernel.GAIN : kernel.GAIN + 4]
+        others = np.reshape(beyond, (-1, 1)) * gain / gain[:, :1]
+        self.bias[at] = np.hypot(fits[:, kernel.BIAS : kernel.BIAS + 4], others)
+
+    def put_noisy(self, at: Indices, fits: Floats, d: int, r: Any, bias: Floats) -> None:
+        """Results of fits by plain least squares."""
+        kernel = self.kernel
+        self.values[at], self.degree[at], self.rings[at] = fits, d, r
+        self.sigma[at], self.freedom[at] = fits[:, kernel.SIGMA], np.maximum(fits[:, kernel.FREEDOM], 1.0)
+        self.bias[at] = bias[:, None] * fits[:, kernel.GAIN : kernel.GAIN + 4] / fits[:, kernel.GAIN, None]
+
+    def clear(self, at: Indices) -> None:
+        """Nothing is known again."""
+        for values in (self.values, self.sigma, self.freedom, self.bias):
+            values[at] = np.nan
+        self.degree[at] = self.rings[at] = 0
+
+    def errors(self, at: Any = slice(None)) -> Floats:
+        """(k, 4): half of intervals that hold the exact values in 95 % of cases."""
+        gain = self.values[at, self.kernel.GAIN : self.kernel.GAIN + 4]
+        noise = stdtrit(self.freedom[at], _QUANTILE)[:, None] * gain * self.sigma[at, None]
+        return np.hypot(np.nan_to_num(noise), 2 * self.bias[at])
+
+    def curvatures(self) -> Curvatures:
+        """What is known."""
+        kernel, out = self.kernel, self.values
+        errors = out[:, kernel.GAIN : kernel.GAIN + 4] * self.sigma[:, None]
+        interval = self.errors()
+        return Curvatures(
+            mean=out[:, kernel.MEAN],
+            gaussian=out[:, kernel.GAUSSIAN],
+            k1=out[:, kernel.K1],
+            k2=out[:, kernel.K2],
+            direction1=out[:, kernel.DIRECTION1],
+            direction2=out[:, kernel.DIRECTION2],
+            normal=out[:, kernel.NORMAL],
+            standard_error=StandardErrors(*errors.T),
+            interval=StandardErrors(*interval.T),
+            noise=self.sigma,
+            degree=self.degree,
+            rings=self.rings,
+        )
+
+
+def chosen(around: Neighbourhoods) -> Curvatures:
+    """All curvatures by the best fit that each vertex can have."""
+    from quadcurv.kernels import jet as kernel
+
+    found = _Found(around)
+    vertices = np.flatnonzero(around.wanted)
+    if vertices.size == 0:
+        return found.curvatures()
+    fits = around.polynomials(vertices, 6, 3, kind=kernel.SMOOTH)
+    good = (fits[:, kernel.CONDITION] <= _CONDITION[6]) & np.isnan(around.border_error[vertices])
+    noisy = good & ~_resolved(fits, 6, around.rounding)
+    at = slice(None) if good.all() else good
+    found.put(vertices[at], fits[at], 6, 3)
+    noisy = np.concatenate((vertices[noisy], _at_sides(around, vertices[~good], fits[~good], found)))
+    if noisy.size:
+        steep = vertices[np.isnan(fits[:, kernel.CONDITION])]
+        noisy = np.union1d(noisy, _steep_by_noise(around, steep, noisy))
+        _average(around, noisy, found)
+    return found.curvatures()
+
+
+def _steep_by_noise(around: Neighbourhoods, steep: Indices, noisy: Indices) -> Indices:
+    """Those of steep vertices most of whose neighbours that are not steep are noisy."""
+    if steep.size == 0:
+        return steep
+    evidence = np.where(around.wanted, 0.0, np.nan)
+    evidence[steep], evidence[noisy] = np.nan, 1.0
+    for _ in range(_FAR):
+        evidence = around.pooled(evidence[:, None])[:, 0]
+    return steep[evidence[steep] > 0.5]
+
+
+def _at_sides(around: Neighbourhoods, vertices: Indices, first: Floats, found: _Found) -> Indices:
+    """Fits where three rings do not do, at rough borders above all; those vertices where noise prevails.
+
+    One-sided fits over more rings, and fits to neighbourhoods completed by a surface fitted at the border:
+    that of the least error, as far as they and their neighbours can tell.
+    """
+    from quadcurv.kernels import jet as kernel
+
+    if vertices.size == 0:
+        return vertices
+    n = around.wanted.size
+    fits, beyond, errors, noisy = [], [], [], np.zeros(vertices.size, bool)
+    for d, r, ghosts in _SIDES:
+        here = first if (d, r) == (6, 3) else around.polynomials(vertices, d, r, ghosts, kernel.SMOOTH)
+        good = here[:, kernel.CONDITION] <= _ONE_SIDED[d]
+        if ghosts:  # points beyond a border are never too steep: look at those that are there
+            there = around.polynomials(vertices, 2, r, False, kernel.SMOOTH)
+            good &= ~np.isnan(there[:, kernel.CONDITION])
+        at = np.flatnonzero(good)
+        resolved = _resolved(here[at], d, around.rounding)
+        if not ghosts:
+            noisy[at[~resolved]] = True
+            at = at[resolved]
+        beyond.append(np.nan_to_num(around.border_error[vertices]) if ghosts else np.zeros(vertices.size))
+        found.put(vertices[at], here[at], d, r, beyond[-1][at])
+        own = found.errors(vertices[at])[:, 0] ** 2
+        whole = np.full((n, 1), np.nan)
+        whole[vertices[at], 0] = own
+        error = np.full(vertices.size, np.inf)
+        error[at] = around.pooled(whole)[vertices[at], 0]
+        fits.append(here)
+        errors.append(error)
+    best = np.argmin(errors, axis=0)
+    known = np.isfinite(np.min(errors, axis=0))
+    found.clear(vertices)
+    for k, (d, r, _) in enumerate(_SIDES):
+        at = known & (best == k)
+        found.put(vertices[at], fits[k][at], d, r, beyond[k][at])
+    todo = np.flatnonzero(~known)
+    for r in _LAST:
+        here = around.polynomials(vertices[todo], 2, r, r == 1, kernel.SMOOTH)
+        good = here[:, kernel.CONDITION] <= _CONDITION[2]
+        found.put(vertices[todo[good]], here[good], 2, r)
+        todo = todo[~good]
+    return vertices[noisy]
+
+
+def _resolved(fits: Floats, d: int, rounding: float) -> Bools:
+    """Whether terms of the two highest degrees explain more than noise would, or the rest is rounding."""
+    from quadcurv.kernels import jet as kernel
+
+    terms, freedom = 2 * d + 1, fits[:, kernel.FREEDOM]
+    explained = (fits[:, kernel.LOWER] - fits[:, kernel.SQUARE]) * np.maximum(freedom, 1.0)
+    exact = fits[:, kernel.SQUARE] <= rounding**2 * np.maximum(freedom, 1.0)
+    return exact | (explained > _RESOLVED * terms * fits[:, kernel.SQUARE])
+
+
+def _average(around: Neighbourhoods, vertices: Indices, found: _Found) -> None:
+    """Take plain least squares at noisy vertices, of degree 4 where that is not biased, else of degree 6."""
+    from quadcurv.kernels import jet as kernel
+
+    n = around.wanted.size
+
+    def run(d: int, r: int, at: Indices) -> Floats:
+        return around.polynomials(at, d, r, ghosts=False, kind=kernel.ROUND)
+
+    def spread(values: Floats) -> Floats:
+        """Means over neighbours, of noisy vertices alone."""
+        whole = np.full((n, values.shape[1]), np.nan)
+        whole[vertices] = values
+        return around.pooled(around.pooled(whole))[vertices]
+
+    high, low = run(6, 3, vertices), run(4, 3, vertices)
+    good6 = (high[:, kernel.CONDITION] <= _CONDITION[6]) & (high[:, kernel.FREEDOM] > 0)
+    good4 = low[:, kernel.CONDITION] <= _CONDITION[4]
+    explained = high[:, kernel.LOWER] - high[:, kernel.SQUARE]
+    squares = np.stack((high[:, kernel.SQUARE], high[:, kernel.FREEDOM], explained), axis=1)
+    square, freedom, explained = spread(np.where(good6[:, None], squares, np.nan)).T
+    noise2 = square / freedom
+    gain6, gain4 = high[:, kernel.GAIN] ** 2, low[:, kernel.GAIN] ** 2
+    bias2 = np.maximum(explained / 13 - (1 + _CHANCE) * noise2, 0.0) * np.maximum(gain6 - gain4, 0.0)
+    bias2 = np.where(np.isnan(bias2), 0.0, bias2)
+    take4 = good4 & ~(good6 & (gain6 * noise2 < gain4 * noise2 + bias2))
+    take6 = good6 & ~take4
+    found.put_noisy(vertices[take4], low[take4], 4, 3, np.sqrt(bias2[take4]))
+    found.put_noisy(vertices[take6], high[take6], 6, 3, np.zeros(take6.sum()))
+    todo = vertices[~take4 & ~take6]
+    for d, r in _WIDE[2:]:
+        if todo.size == 0:
+            break
+        fits = run(d, r, todo)
+        good = (fits[:, kernel.CONDITION] <= _CONDITION[d]) & (fits[:, kernel.FREEDOM] > 0)
+        found.put_noisy(todo[good], fits[good], d, r, np.zeros(good.sum()))
+        todo = todo[~good]

@@ -1,0 +1,146 @@
+"""The default fit, chosen vertex by vertex: orders, error bars, coarse meshes, borders."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.stats import spearmanr
+from test_jet import noisy, sampled
+
+import quadcurv as qc
+from quadcurv import surfaces
+from quadcurv.estimate import disagreement
+from quadcurv.refinement import fitted_rate
+from quadcurv.schemes import jet
+
+# ---- convergence ---------------------------------------------------------------------------------------
+
+SMOOTH = [
+    ("elliptic_paraboloid", "grid", (32, 64, 128), 5.7, 1.3e-7),
+    ("tanh_sheet", "grid", (32, 64, 128), 5.5, 1.2e-7),
+    ("enneper", "grid", (32, 64, 128), 5.7, 2.5e-8),
+    ("hyperboloid", "grid", (32, 64, 128), 4.6, 6e-7),
+    ("catenoid", "grid", (32, 64, 128), 4.6, 1e-6),
+    ("torus", "grid", (32, 64, 128), 4.7, 2.8e-6),
+    ("dupin_cyclide", "grid", (32, 64, 128), 4.6, 5.5e-5),
+    ("ellipsoid", "grid", (32, 64, 128), 5.8, 5e-7),
+    ("cubed_ellipsoid", "faces", (16, 32, 64), 5.6, 1.4e-7),
+]
+
+
+@pytest.mark.parametrize(("name", "layout", "sizes", "rate", "bound"), SMOOTH)
+def test_order_on_smooth_meshes(name, layout, sizes, rate, bound):
+    """In the inf-norm, borders, seams and vertices of valence 3 included."""
+    errors = []
+    for n in sizes:
+        mesh, exact = sampled(name, n, layout=layout)
+        errors.append(np.abs(qc.mean_curvature(mesh) - exact).max())
+    assert errors[-1] < bound
+    assert fitted_rate(sizes, errors) > rate
+
+
+@pytest.mark.parametrize(
+    ("name", "layout", "sizes", "rate", "bound"),
+    [
+        ("elliptic_paraboloid", "grid", (32, 64, 128), 4.2, 2e-6),
+        ("tanh_sheet", "grid", (32, 64, 128), 4.2, 1.5e-5),
+        ("enneper", "grid", (32, 64, 128), 3.8, 8e-5),
+        ("hyperboloid", "grid", (32, 64, 128), 3.4, 1e-4),
+        ("torus", "grid", (32, 64, 128), 4.2, 1e-5),
+        ("dupin_cyclide", "grid", (32, 64, 128), 4.1, 1.4e-4),
+        ("cubed_ellipsoid", "faces", (16, 32, 64), 4.8, 1e-6),
+    ],
+)
+def test_order_under_jitter(name, layout, sizes, rate, bound):
+    """Vertices moved along the surface by up to 20 % of their spacing; the inf-norm, borders included."""
+    errors = []
+    for n in sizes:
+        mesh, exact = sampled(name, n, 0.2, layout)
+        errors.append(np.abs(qc.mean_curvature(mesh) - exact).max())
+    assert errors[-1] < bound
+    assert fitted_rate(sizes, errors) > rate
+
+
+@pytest.mark.parametrize("jitter", [0.0, 0.2])
+def test_a_tenth_of_the_error_of_plain_fits(jitter):
+    mesh, exact = sampled("cubed_ellipsoid", 24, jitter, "faces")
+    error, plain = (np.abs(qc.mean_curvature(mesh, s) - exact) for s in ("jet", jet(4)))
+    assert error.mean() < 0.03 * plain.mean()
+    assert error.max() < 0.1 * plain.max()
+
+
+@pytest.mark.parametrize("layout", ["faces", "grid"])
+def test_spheres_are_exact(layout):
+    """To rounding; where a grid ends around a pole ghosts are not."""
+    for n in (6, 16):
+        surface = surfaces.cubed_sphere(2.0) if layout == "faces" else surfaces.sphere(2.0)
+        mesh, _, _ = surface.sample((n, n), layout)
+        found = qc.curvatures(mesh)
+        inside = slice(None) if layout == "faces" else np.s_[:, 3:-3]
+        assert np.abs(found.mean - 0.5)[inside].max() < 1e-7
+        assert np.abs(found.gaussian - 0.25)[inside].max() < 1e-7
+
+
+def test_grids_and_face_lists_agree():
+    mesh, _ = sampled("tanh_sheet", 24)
+    grid, faces = qc.curvatures(mesh), qc.curvatures(mesh.to_mesh())
+    assert np.abs(grid.mean.ravel() - faces.mean).max() < 1e-7
+    assert np.array_equal(grid.degree.ravel(), faces.degree)
+
+
+def test_fine_meshes_lose_no_more_to_rounding():
+    grid, exact = sampled("elliptic_paraboloid", 512)
+    error, plain = (np.abs(qc.mean_curvature(grid, s) - exact)[8:-8, 8:-8] for s in ("jet", jet(4)))
+    assert error.max() < plain.max()
+
+
+# ---- coarse meshes -------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(("n", "bound"), [(2, 0.10), (4, 0.03), (8, 1e-3)])
+def test_coarse_ellipsoids(n, bound):
+    """Of 26, 98 and 386 vertices, the axes 1.3 : 1 : 0.8."""
+    axes = np.array([1, 0.8, 1.3])
+    mesh = surfaces.cubed_sphere().sample((n, n), "faces")[0]
+    points = mesh.points * axes
+    support = 1 / np.linalg.norm(points / axes**2, axis=1)
+    exact = support**3 * (np.sum(axes**2) - np.sum(points**2, axis=1)) / (2 * np.prod(axes) ** 2)
+    error = np.abs(qc.mean_curvature(mesh.with_points(points)) - exact)
+    assert error.mean() < bound
+
+
+@pytest.mark.parametrize(("shape", "bound"), [((6, 4), 0.08), ((8, 5), 0.05), ((10, 5), 0.04)])
+def test_low_cylinders(shape, bound):
+    grid, _, _ = surfaces.cylinder().sample(shape)
+    assert np.abs(qc.mean_curvature(grid) - 0.5).max() < bound
+
+
+# ---- error bars ----------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("noise", [1e-4, 1e-3, 1e-2, 5e-2, 0.3])
+@pytest.mark.parametrize(("name", "n"), [("torus", 64), ("cubed_ellipsoid", 24), ("enneper", 48)])
+def test_intervals_cover(name, n, noise):
+    mesh, exact = noisy(name, n, noise)
+    found = qc.curvatures(mesh)
+    assert 0.92 < np.mean(np.abs(found.mean - exact[0]) <= found.interval.mean) < 0.985
+
+
+@pytest.mark.parametrize(
+    ("name", "layout", "n", "jitter"),
+    [("torus", "grid", 64, 0), ("cubed_ellipsoid", "faces", 24, 0), ("cubed_ellipsoid", "faces", 24, 0.2)],
+)
+def test_the_error_of_plain_fits_is_known(name, layout, n, jitter):
+    mesh, exact = sampled(name, n, jitter, layout)
+    error = np.abs(qc.mean_curvature(mesh, jet(4)) - exact)
+    estimate = np.abs(disagreement(mesh, jet(4)))
+    assert spearmanr(error.ravel(), estimate.ravel()).statistic > 0.97
+    assert 0.9 < estimate.mean() / error.mean() < 1.1
+
+
+def test_noise_is_averaged():
+    mesh, (H, *_) = noisy("cubed_ellipsoid", 24, 1e-2)
+    error, plain = (np.abs(qc.mean_curvature(mesh, s) - H).mean() for s in ("jet", jet(4)))
+    assert error < plain / 3
+    found = qc.curvatures(mesh)
+    assert np.mean(found.degree == 4) > 0.9
