@@ -70,8 +70,8 @@ class MeshNeighbourhoods:
         self.wanted = self.present & self.stencils.closed if boundary == "nan" else self.present
         # Standard error of H and noise by surfaces fitted at the border: points read off these show none.
         self.border_error, self.border_noise = np.full((2, self.stencils.n), np.nan)
-        x = self.stencils.points
-        self.rounding = _ROUNDING * float(np.abs(x[np.isfinite(x)]).max(initial=0.0))
+        x = self.stencils.points[: self.stencils.n][self.present]
+        self.rounding = _ROUNDING * float(np.abs(x).max(initial=0.0))
 
     def polynomials(
         self, vertices: Indices, degree: int, rings: int, ghosts: bool = True, kind: int = 0

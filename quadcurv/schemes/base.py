@@ -260,7 +260,7 @@ class Fit:
     --------
     >>> import quadcurv as qc
     >>> qc.SCHEMES["jet"].order
-    4
+    6
     """
 
     name: str
