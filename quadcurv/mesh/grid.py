@@ -61,7 +61,7 @@ class QuadGrid:
     >>> hill = qc.QuadGrid(np.stack([x, y, np.exp(-(x**2) - y**2)], axis=-1))
     >>> hill
     QuadGrid(21 x 21 points, wrap=(False, False))
-    >>> round(float(qc.mean_curvature(hill)[10, 10]), 2)
+    >>> round(float(qc.mean_curvature(hill)[10, 10]), 1)
     2.0
     """
 
