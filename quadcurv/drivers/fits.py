@@ -33,6 +33,7 @@ from quadcurv.types import Bools, Floats, Indices, Ints
 _GHOST_DEGREE, _GHOST_LAYERS = 5, 3
 _ROUND = 1  # of jet.KINDS, which is not loaded before it is needed
 _ROUNDING = 2.0**-49  # of positions, and of what is computed from them
+_SURE = 0.01
 # Of one fit, in vertices of the finite-volume scheme.
 _WORK = 30
 
@@ -309,9 +310,10 @@ def _continued(stencils: Stencils, layers: int) -> list[_Beyond]:
     points = np.concatenate((part.points, layer.points))
     faces = np.concatenate((part.faces, layer.quads))
     closed = part.closed | layer.smooth
-    if layers < _GHOST_LAYERS:  # what is looked at from far away must be right beyond doubt
-        unsure = np.flatnonzero(np.isfinite(layer.error) & ~layer.smooth)
-        closed[unsure] = layer.error[unsure] <= fitted(part, unsure).error
+    unsure = np.flatnonzero(np.isfinite(layer.error) & ~layer.smooth)
+    # What is looked at with many others, by polynomials of a higher degree, must be right beyond doubt.
+    share = 1.0 if layers < _GHOST_LAYERS else _SURE
+    closed[unsure] = layer.error[unsure] <= share * fitted(part, unsure).error
     ghosted = Stencils(points, faces, part.shape, closed, part.orientable)
     near = np.arange(len(points)) >= part.n
     bad = np.zeros(len(points), bool)
