@@ -64,10 +64,18 @@ def test_shown_in_a_few_lines(name):
     assert text.count("<table") == text.count("</table")
 
 
-@pytest.mark.parametrize("name", [name for name in SHOWN if name != "curvatures"])
+@pytest.mark.parametrize("name", SHOWN)
 def test_bare_repr_is_one_line(name):
     assert "\n" not in repr(SHOWN[name])
     assert len(repr(SHOWN[name])) < 200
+
+
+def test_bare_curvatures_count_those_without():
+    grid = SHOWN["grid"]
+    mask = np.zeros(grid.shape, bool)
+    mask[2, 3] = True
+    found = qc.curvatures(qc.QuadGrid(grid.points, grid.wrap, mask))
+    assert re.fullmatch(r"Curvatures\(8 x 6 vertices, H \S+ to \S+, 1 without\)", repr(found))
 
 
 def test_mesh_shows_its_extent_and_report():

@@ -147,6 +147,12 @@ class Curvatures:
     degree: Ints | None = None
     rings: Ints | None = None
 
+    def __repr__(self) -> str:
+        known = self.mean[np.isfinite(self.mean)]
+        size = " x ".join(map(str, self.mean.shape))
+        ends = f"H {known.min():.4g} to {known.max():.4g}, " if known.size else ""
+        return f"Curvatures({size} vertices, {ends}{self.mean.size - known.size} without)"
+
     def _repr_html_(self) -> str:
         """What a notebook shows: the range of every curvature, and how many vertices have none."""
         errors = self.standard_error
