@@ -139,7 +139,7 @@ def _treated(mesh: Mesh, boundary: str) -> tuple[Stencils, NDArray[np.uint8]]:
     if isinstance(mesh, QuadGrid) and mesh.mask is not None:
         mesh = mesh.to_mesh()
     given = mesh.stencils()
-    if isinstance(mesh, QuadGrid) and (found := poles(mesh)):
+    if isinstance(mesh, QuadGrid) and (found := poles(mesh)) is not None:
         treated, treatment = closed_grid(mesh, found)
         if boundary == "nan":
             treatment = np.where(given.closed, treatment, OPEN).astype(np.uint8)

@@ -54,10 +54,16 @@ def cells_within(grid: StaggeredGrid, centres: Floats) -> Stencils:
 
 
 def cells_at_poles(grid: StaggeredGrid) -> Indices:
-    """Cells, flat, with a side that is one point."""
+    """Cells, flat, with a side that is one point, and those beyond them, which are as narrow."""
+    pole = poles(grid)
+    if pole is None:
+        return np.empty(0, np.int64)
     beside = np.zeros(grid.shape, bool)
-    for axis, end in poles(grid):
-        np.moveaxis(beside, axis, 0)[end] = True
+    for axis in (0, 1):
+        corners, cells = np.moveaxis(pole, axis, 0), np.moveaxis(beside, axis, 0)
+        for end, rows in ((0, [0, 1]), (-1, [-1, -2])):
+            one = (corners[end][1:] >= 0) & (corners[end][1:] == corners[end][:-1])
+            cells[rows[: len(cells)]] |= one
     return np.flatnonzero(beside)
 
 

@@ -15,7 +15,7 @@ import numpy as np
 
 from quadcurv.types import Bools, Floats, Indices
 
-NODES = 6  # of a line; the last one may be missing
+NODES, LEAST = 6, 4  # points of a line; how many there must be
 # A line is smooth where, in squares, the last point changes less than this part of what the last but one
 # does, or this part of what the one before does (the last but one does nothing where a line is odd); along
 # the normal, where noise of the surface shows, but for this part of all that the last but one does.
@@ -24,6 +24,8 @@ _ROUNDING = 2.0**-95  # of coordinates, squared, as extrapolation magnifies it
 # Fourth-order schemes ask for more: the last point changes no more than this, squared, of what the changes of
 # the two points before it, as a geometric series, lead to expect.
 _EXPECTED = 9.0
+# And noise may cause no more than this part of the curvature there.
+_DOUBT = 0.03
 # Where the last point changes less than the last but one there is little noise: then what a fitted surface
 # leaves at the points is but a third of what it misses beyond the border.
 _CALM, _FAITHFUL = 0.6, 0.1
@@ -69,14 +71,16 @@ def extended(lines: Floats, turn: Floats, degree: int, layers: int, beside: Indi
     Parameters
     ----------
     lines : (k, 6, 3) float64
-        Points from the border inward; NaN for a sixth one that is missing, if the degree is 4.
+        Points from the border inward; NaN for the last ones that are missing, of a line of four or five.
     turn : (k,) float64
         Sine of the angle by which the surface turns from X_0 to the next points.
     degree, layers : int
-        Of the polynomial; how many ghosts beyond it.
+        Of the polynomial, as high as there are points for; how many ghosts beyond it.
     beside : (m, 2) int64
         Lines that end beside each other, all in the same sense.
     """
+    number = np.isfinite(lines).all(axis=2).sum(axis=1)
+    lines = _completed(lines)
     x = lines - lines[:, :1]  # an offset costs no digits
     size = np.linalg.norm(x[:, 1], axis=1)
     size = np.where(size > 0, size, 1.0)[:, None]
@@ -84,7 +88,7 @@ def extended(lines: Floats, turn: Floats, degree: int, layers: int, beside: Indi
     normal = np.cross(x[:, 1], _sideways(lines[:, 0], beside) / size)
     normal /= np.linalg.norm(normal, axis=1, keepdims=True)
     rounding = rounding_of(lines[:, ::4]) / size[:, 0] ** 2
-    ends = _Ends(x[:, 1], normal, turn, rounding, beside)
+    ends = _Ends(x[:, 1], normal, turn, rounding, beside, number)
     terms = np.stack([np.einsum("j,kjx->kx", w, x[:, : w.size]) for w in _DIFFERENCES])
     every = np.ones(len(lines), bool)
     ghosts = continued(x[:, : degree + 1], layers, every)
@@ -93,7 +97,7 @@ def extended(lines: Floats, turn: Floats, degree: int, layers: int, beside: Indi
     if not even.all():
         s, table = _newton(x)
         steps = _beyond(s, 0)[:, None] - s
-        terms = np.stack([table[:, k] * np.prod(steps[:, :k], axis=1) for k in (3, 4, 5)])
+        terms = np.stack([table[:, k] * np.prod(steps[:, :k], axis=1) for k in (1, 2, 3, 4, 5)])
         by_length = continued(x[:, : degree + 1], layers, ~every)
         other, smooth = _error(terms, by_length, ends, degree)
         by_index = even | (~smooth & (error <= other))
@@ -116,45 +120,90 @@ def continued(lines: Floats, layers: int, even: Bools) -> Floats:
     return lines[:, :1] + ghosts
 
 
-_DIFFERENCES = [np.array([(-1.0) ** j * comb(order, j) for j in range(order + 1)]) for order in (3, 4, 5)]
+def _completed(lines: Floats) -> Floats:
+    """Lines with points in place of missing ones, on the polynomials through those that are there."""
+    whole = lines.copy()
+    for k in range(LEAST, NODES):
+        missing = np.isnan(whole[:, k]).any(axis=1)
+        x = whole[missing, :k][:, ::-1]
+        whole[missing, k] = x[:, 0] + np.einsum("j,kjx->kx", index_weights(k - 1), x - x[:, :1])
+    return whole
+
+
+_DIFFERENCES = [np.array([(-1.0) ** j * comb(order, j) for j in range(order + 1)]) for order in range(1, 6)]
+
+
+def doubtful_corners(blocks: Floats, layers: int, turn: Floats) -> tuple[Floats, Bools]:
+    """What noise makes ghosts of ghosts, at corners, be off by (k,), and whether that is too much.
+
+    `blocks` (k, 2, m, m, 3) are the m points of the first m lines of either side. Of a smooth surface their
+    last difference along the lines and from line to line is as good as nothing.
+    """
+    order = blocks.shape[2] - 1
+    last = _DIFFERENCES[order - 1]
+    off = np.einsum("i,j,ksijx->ksx", last, last, blocks - blocks[:, :, :1, :1])
+    noise = np.linalg.norm(off, axis=2).max(axis=1) / (last @ last)
+    error = noise * np.square(index_weights(order, layers)).sum() / 2
+    edge = np.linalg.norm(blocks[:, 0, 0, 1] - blocks[:, 0, 0, 0], axis=1)
+    return error, ~(error < _DOUBT * turn * edge)
 
 
 class _Ends(NamedTuple):
-    """Where lines end: the first step inward and the normal, and what else a ghost's error rests on."""
+    """Where lines end: the first step inward and the normal, and what else a ghost's error rests on.
+
+    `number` is that of the points of each line.
+    """
 
     inward: Floats
     normal: Floats
     turn: Floats
     rounding: Floats
     beside: Indices
+    number: Indices
 
 
 def _error(terms: Floats, ghosts: Floats, ends: _Ends, degree: int) -> tuple[Floats, Bools]:
     """Estimated error of ghosts, relative to X_0, and whether they are smooth beyond doubt.
 
-    `terms` (3, k, 3) are what the fourth, fifth and sixth point of lines change.
+    `terms` (5, k, 3) are what the second to the sixth point of lines change.
     """
-    inward, normal, turn, rounding, beside = ends
-    short = np.isnan(terms[2]).any(axis=1, keepdims=True)
-    last, before = np.where(short, terms[1], terms[2]), np.where(short, terms[0], terms[1])
-    earlier = np.where(short, 0.0, terms[0])
+    inward, normal, turn, rounding, beside, number = ends
+    last, before, first = (terms[number - 1 - k, np.arange(number.size)] for k in (1, 2, 3))
+    earlier = np.where((number < NODES)[:, None], 0.0, first)
     along, all_ = _dot(last, normal) ** 2, _dot(last, last)
     expected = np.maximum(SMOOTH * _dot(before, before), EARLIER * _dot(earlier, earlier))
     most = np.maximum(SMOOTH * _dot(before, normal) ** 2, EARLIER * _dot(earlier, normal) ** 2)
     most += HIDDEN * _dot(before, before)
     if degree > 4:
-        most = np.minimum(most, _EXPECTED * _dot(before, before) ** 2 / _dot(terms[0], terms[0]))
+        most = np.minimum(most, _EXPECTED * _dot(before, before) ** 2 / _dot(first, first))
     excess = np.maximum(all_ - expected, along - most) - rounding
     steps = np.diff(ghosts, axis=1, prepend=0.0)
     outward, edge = -np.einsum("klx,kx->kl", steps, inward), _dot(inward, inward)
     outside = (outward[:, 0] > 0.2 * edge) & (outward > 0).all(axis=1)
     outside &= _dot(ghosts[:, 0], ghosts[:, 0]) < 4 * edge
     smooth = without_excess(np.where(outside, excess, np.inf), beside)
+    smooth &= number > (LEAST if degree < 5 else LEAST + 1)
     # Along the surface an error does harm by as much as the surface turns from point to point.
     square = _around(along + turn**2 * all_, beside)
     calm = _around(along, beside) < _CALM * _around(_dot(before, normal) ** 2, beside)
-    error = np.sqrt(np.where(calm & (degree < 5), _FAITHFUL, 1.0) * square)
+    square = np.where(calm & (degree < 5), _FAITHFUL, 1.0) * square
+    if degree > 4:
+        doubt = (
+            _noise2(_dot(last, normal), number, beside)
+            * np.square(index_weights(degree, ghosts.shape[1])).sum()
+        )
+        smooth &= doubt < _DOUBT**2 * turn**2 * edge
+        square = np.maximum(square, doubt)
+    error = np.sqrt(square)
     return np.where(outside & ~np.isnan(error), error, np.inf), smooth
+
+
+def _noise2(last: Floats, number: Indices, beside: Indices) -> Floats:
+    """Square of the noise of lines, by how far their last differences are from those of the lines beside."""
+    gain = np.array([comb(2 * m - 2, m - 1) for m in range(1, NODES + 1)])[number - 1]
+    others = _sum_beside(np.ones_like(last), beside) - 1
+    off = last - (_sum_beside(last, beside) - last) / np.maximum(others, 1)
+    return _around(np.where(others > 0, off**2 / (gain * (1 + 1 / np.maximum(others, 1))), 0.0), beside)
 
 
 def _dot(a: Floats, b: Floats) -> Floats:

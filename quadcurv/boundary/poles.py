@@ -1,12 +1,10 @@
-"""Sides of a grid that are one point but for rounding: the poles of a sphere, the tip of a triangular patch.
+"""Sides of a grid, or parts of them, that are one point but for rounding: poles of a sphere, tips of patches.
 
 Quads beside them are triangles, many and narrow, on which most schemes are far off or have no value. Both the
 pole and the row beside it get their rings from fitted surfaces instead, without these triangles.
 """
 
 from __future__ import annotations
-
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,72 +14,88 @@ from quadcurv.mesh import QuadGrid, StaggeredGrid
 from quadcurv.stencils import Stencils, grid_faces
 from quadcurv.types import Bools, Indices, Ints
 
-_POINT = 1e-9  # extent of such a side, in distances to the next row
-
-
-class Pole(NamedTuple):
-    """A side that is one point: the first (end 0) or last (-1) row of an axis."""
-
-    axis: int
-    end: int
+_POINT = 1e-9  # distance of such points, in distances to the next row
+_LEAST = 3  # of such points: a quad with two corners at one place is no pole
 
 
 @np.errstate(all="ignore")
-def poles(grid: QuadGrid | StaggeredGrid) -> list[Pole]:
-    """The sides of a grid, or of the corners of its cells, that are one point."""
-    found: list[Pole] = []
+def poles(grid: QuadGrid | StaggeredGrid) -> Indices | None:
+    """The vertices of a grid, or corners of cells, that are at a pole: (r, c), the first one there, else -1.
+
+    None if none is.
+    """
     points = grid.points if isinstance(grid, QuadGrid) else grid.dual
     if isinstance(grid, QuadGrid) and grid.mask is not None:
-        return found
+        return None
+    number = np.arange(points.shape[0] * points.shape[1]).reshape(points.shape[:2])
+    found = None
     for axis in (0, 1):
         if grid.wrap[axis]:
             continue
-        rows = np.moveaxis(points, axis, 0)
+        rows, numbers = np.moveaxis(points, axis, 0), np.moveaxis(number, axis, 0)
         for end in (0, -1):
             side, beside = rows[end], rows[1 if end == 0 else -2]
-            step = np.linalg.norm(beside[0] - side[0])
-            most = _POINT * step + 16 * grid.roundoff * np.abs(side[0]).max()
-            # One point first, which tells of nearly all grids that there is no more to look at.
-            far = np.abs(side[len(side) // 2] - side[0]).max()
-            if far <= most < 1e-3 * step and np.abs(side - side[0]).max() <= most:
-                found.append(Pole(axis, end))
+            step = np.linalg.norm(beside - side, axis=1)
+            most = _POINT * step + 16 * grid.roundoff * np.abs(side).max()
+            one = (np.abs(side - np.roll(side, -1, axis=0)).max(axis=1) <= most) & (most < 1e-3 * step)
+            if not (grid.wrap[1 - axis] and isinstance(grid, QuadGrid)):
+                one[-1] = False
+            if one.any() and (pole := _of_runs(one, numbers[end])).max() >= 0:
+                found = np.full(number.shape, -1) if found is None else found
+                of_side = np.moveaxis(found, axis, 0)[end]
+                of_side[pole >= 0] = pole[pole >= 0]
     return found
 
 
-def welded(grid: QuadGrid, found: list[Pole]) -> tuple[Stencils, Indices]:
+def _of_runs(one: Bools, number: Indices) -> Indices:
+    """The first number of each run of points that are one with the next, -1 for others."""
+    size = one.size
+    begin = 0 if one.all() else int(np.argmin(one)) + 1  # of a run, even across a seam
+    order = (begin + np.arange(size)) % size
+    goes_on = np.concatenate(([False], one[order][:-1]))
+    run = np.cumsum(~goes_on) - 1
+    first = number[order][~goes_on][run]
+    pole = np.empty(size, np.int64)
+    pole[order] = np.where(np.bincount(run)[run] >= _LEAST, first, -1)
+    return pole
+
+
+def welded(grid: QuadGrid, pole: Indices) -> tuple[Stencils, Indices]:
     """Stencils with one vertex and triangles at each pole; that vertex for each point of a pole, else -1."""
-    vertex = np.arange(grid.shape[0] * grid.shape[1], dtype=np.int32).reshape(grid.shape)
-    pole = np.full(grid.shape, -1)
-    for axis, end in found:
-        side = np.moveaxis(vertex, axis, 0)[end]
-        side[...] = side[0]
-        np.moveaxis(pole, axis, 0)[end] = side[0]
+    vertex = np.where(pole >= 0, pole, np.arange(pole.size).reshape(pole.shape)).astype(np.int32)
     faces = grid_faces(np.pad(vertex, [(0, int(w)) for w in grid.wrap], mode="wrap"))
     given = grid.stencils()
     return Stencils(given.points, _without_repetition(faces), given.shape, given.closed), pole.ravel()
 
 
-def closed_grid(grid: QuadGrid, found: list[Pole]) -> tuple[Stencils, NDArray[np.uint8]]:
+def closed_grid(grid: QuadGrid, pole: Indices) -> tuple[Stencils, NDArray[np.uint8]]:
     """Stencils with closed rings, each point of a pole with the same one, and what closes each."""
-    return closed(*welded(grid, found))
+    return closed(*welded(grid, pole))
 
 
 @np.errstate(all="ignore")
 def parts_at_poles(grid: QuadGrid) -> list[tuple[Indices, QuadGrid, Bools]]:
     """Vertices of the rows near each pole, the grids of these, which of them are at or beside it."""
     near: list[tuple[Indices, QuadGrid, Bools]] = []
-    found = poles(grid)
-    if not found:
+    pole = poles(grid)
+    if pole is None:
         return near
-    number = np.arange(grid.shape[0] * grid.shape[1]).reshape(grid.shape)
-    for axis, end in found:
-        size = min(REACH + 3, grid.shape[axis])
-        rows = slice(0, size) if end == 0 else slice(grid.shape[axis] - size, None)
-        cut = (rows, slice(None)) if axis == 0 else (slice(None), rows)
-        beside = np.zeros(number[cut].shape, bool)
-        np.moveaxis(beside, axis, 0)[[0, 1] if end == 0 else [-1, -2]] = True
-        wrap = [w and i != axis for i, w in enumerate(grid.wrap)]
-        near.append((number[cut].ravel(), QuadGrid(grid.points[cut], wrap), beside.ravel()))
+    number = np.arange(pole.size).reshape(pole.shape)
+    for axis in (0, 1):
+        for end in (0, -1):
+            side = np.moveaxis(pole, axis, 0)[end]
+            at = (side >= 0) & ((side == np.roll(side, 1)) | (side == np.roll(side, -1)))
+            if grid.wrap[axis] or not at.any():  # a pole's end is a corner of another side
+                continue
+            size = min(REACH + 3, grid.shape[axis])
+            rows = slice(0, size) if end == 0 else slice(grid.shape[axis] - size, None)
+            cut = (rows, slice(None)) if axis == 0 else (slice(None), rows)
+            beside = np.zeros(number[cut].shape, bool)
+            around = np.pad(at, 1, mode="wrap" if grid.wrap[1 - axis] else "constant")
+            of_side = around[:-2] | around[1:-1] | around[2:]
+            np.moveaxis(beside, axis, 0)[[0, 1] if end == 0 else [-1, -2]] = of_side
+            wrap = [w and i != axis for i, w in enumerate(grid.wrap)]
+            near.append((number[cut].ravel(), QuadGrid(grid.points[cut], wrap), beside.ravel()))
     return near
 
 

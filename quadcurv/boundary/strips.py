@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from quadcurv.boundary.lines import NODES, continued, extended
+from quadcurv.boundary.lines import LEAST, NODES, continued, doubtful_corners, extended
 from quadcurv.stencils import Stencils, face_pairs
 from quadcurv.types import Bools, Floats, Indices
 
@@ -70,7 +70,7 @@ class _Lines(NamedTuple):
 
 def _lines(mesh: Stencils, least: int) -> _Lines:
     rails, slot, valence, n_edges = _strips(mesh, least)
-    long_first = np.argsort(rails[:, -1] < 0, kind="stable")
+    long_first = np.argsort((rails < 0).sum(axis=1), kind="stable")
     key = rails[long_first, 0] * mesh.n + rails[long_first, 1]
     _, first, line = np.unique(key, return_index=True, return_inverse=True)
     line = line[np.argsort(long_first)]
@@ -80,12 +80,13 @@ def _lines(mesh: Stencils, least: int) -> _Lines:
 @np.errstate(all="ignore")
 def ghosts(mesh: Stencils, degree: int = 4, layers: int = 1) -> Ghosts:
     """Continue the strips inward from border edges by `layers` ghosts on polynomials of a degree."""
-    n, found = mesh.n, _lines(mesh, degree + 1)
+    n, found = mesh.n, _lines(mesh, LEAST)
     rails, line, lines, slot, valence, n_edges = found
     if len(rails) == 0:
         return Ghosts(np.empty((0, 3)), np.empty((0, 4), np.int32), np.full(n, np.inf), np.zeros(n, bool))
     x = np.where(lines[..., None] >= 0, mesh.points[lines], np.nan)
-    beside = extended(x, _normals(mesh)[1][lines[:, 0]], degree, layers, found.beside)
+    turn = _normals(mesh)[1]
+    beside = extended(x, turn[lines[:, 0]], degree, layers, found.beside)
     outward = np.concatenate((rails[:, :1], n + layers * line[:, None] + np.arange(layers)), axis=1)
     quads = _block_quads(outward.reshape(-1, 2, layers + 1).transpose(0, 2, 1)[..., ::-1], slot)
 
@@ -116,6 +117,10 @@ def ghosts(mesh: Stencils, degree: int = 4, layers: int = 1) -> Ghosts:
     closed = side
     error[c] = _CORNER * beside.error[across].max(axis=1).reshape(-1, 2).max(axis=1)
     smooth[c] = beside.smooth[across].all(axis=1).reshape(-1, 2).all(axis=1)
+    if degree > 4 and c.size:  # ghosts of ghosts, which magnify noise by thousands
+        blocks = x[across, : degree + 1].reshape(-1, 2, degree + 1, degree + 1, 3)
+        doubt, doubtful = doubtful_corners(blocks, layers, turn[c])
+        error[c], smooth[c] = np.maximum(error[c], doubt), smooth[c] & ~doubtful
     closed[c] = True
     ghosts = np.concatenate((beside.ghosts.reshape(-1, 3), points.reshape(-1, 3)))
     error[~closed] = np.inf

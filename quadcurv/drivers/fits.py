@@ -36,6 +36,7 @@ _ROUNDING = 2.0**-49  # of positions, and of what is computed from them
 _SURE = 0.01
 # Of one fit, in vertices of the finite-volume scheme.
 _WORK = 30
+_CLEARLY = 3.0  # what the standard error of a one-sided fit must be of another's to be thought larger
 
 
 def fit(mesh: Mesh, scheme: Fit, boundary: str = "extrapolate") -> Curvatures:
@@ -78,11 +79,19 @@ class MeshNeighbourhoods:
         self, vertices: Indices, degree: int, rings: int, ghosts: bool = True, kind: int = 0
     ) -> Floats:
         """(k, COLUMNS): see `Neighbourhoods`."""
+        from quadcurv.kernels import jet
+
         # Windows have the normals of their rings alone.
         own = self._faces if self._windows is None or kind == _ROUND else self._windows
         out = own.polynomials(vertices, degree, rings, kind)
-        for faces, place, reach in (*(self._beyond(rings) if ghosts else ()), *self._at_poles(rings)):
+        for faces, place, reach, error in (*(self._beyond(rings) if ghosts else ()), *self._at_poles(rings)):
             at = place[vertices]
+            if error is not None:  # one-sided fits follow a smooth surface as well, but magnify noise
+                if kind == jet.SMOOTH:
+                    continue  # which the scheme looks at itself
+                own_error = out[:, jet.SIGMA] * out[:, jet.GAIN]
+                at = np.where(own_error <= _CLEARLY * error[at], -1, at)
+                self.border_error[vertices[at >= 0]] = error[at[at >= 0]]
             once, again = np.unique(at[at >= 0], return_inverse=True)  # all points of a pole are one vertex
             out[at >= 0] = faces.polynomials(once, degree, reach, kind)[again]
         return out
@@ -90,9 +99,9 @@ class MeshNeighbourhoods:
     def positions(self, vertices: Indices, rings: int) -> tuple[Floats, Floats]:
         """(k, m, 3) and (k, 3): see `Neighbourhoods`."""
         out, normals = self._faces.positions(vertices, rings), self._faces.normals[vertices]
-        for faces, place, reach in (*self._beyond(rings), *self._at_poles(rings)):
+        for faces, place, reach, error in (*self._beyond(rings), *self._at_poles(rings)):
             at = place[vertices]
-            kept = at >= 0
+            kept = (at >= 0) & (error is None)
             out = _replaced(out, kept, faces.positions(at[kept], reach))
             normals[kept] = faces.normals[at[kept]]
         return out, normals
@@ -150,6 +159,11 @@ class MeshNeighbourhoods:
             for replaced in self._replaced[rings]:
                 left &= replaced.place < 0
             self._replaced[rings] += self._mirrored(np.flatnonzero(left), rings)
+            if rings > 1:  # neighbourhoods that end at the border all the same
+                beside = _with_neighbours(self.stencils, left) & self.present
+                for replaced in self._replaced[rings]:
+                    beside &= replaced.place < 0
+                self._replaced[rings] += self._mirrored(np.flatnonzero(beside & ~left), rings, inside=True)
         return self._replaced[rings]
 
     def _at_poles(self, rings: int) -> list[_Beyond]:
@@ -158,7 +172,7 @@ class MeshNeighbourhoods:
 
     @cached_property
     def _poles(self) -> list[_Beyond]:
-        if not isinstance(self.mesh, QuadGrid) or not (found := poles(self.mesh)):
+        if not isinstance(self.mesh, QuadGrid) or (found := poles(self.mesh)) is None:
             return []
         stencils, pole = welded(self.mesh, found)
         near = np.isin(stencils.faces, pole[pole >= 0]).any(axis=1)
@@ -167,19 +181,21 @@ class MeshNeighbourhoods:
         place[beside] = beside
         return [_Beyond(_FaceNeighbourhoods(stencils), place, 0)]
 
-    def _mirrored(self, vertices: Indices, rings: int) -> list[_Beyond]:
+    def _mirrored(self, vertices: Indices, rings: int, inside: bool = False) -> list[_Beyond]:
         """Neighbourhoods completed by points of fitted surfaces, as stencils that lead to these points."""
         surfaces = fitted(self.stencils, vertices)
         rows = np.flatnonzero(np.isfinite(surfaces.error))
         if rows.size == 0:
             return []
         vertices, surfaces = vertices[rows], surfaces.of(rows)
-        self.border_error[vertices] = surfaces.noise * surfaces.gain
-        self.border_noise[vertices] = surfaces.noise
+        error = surfaces.noise * surfaces.gain
+        if not inside:
+            self.border_error[vertices], self.border_noise[vertices] = error, surfaces.noise
         points = mirrored(self.stencils, surfaces, rings)
         place = np.full(self.stencils.n, -1)
         place[vertices] = np.arange(vertices.size)
-        return [_Beyond(_FaceNeighbourhoods(_bundles(points), surfaces.frames[:, 2]), place, 1)]
+        faces = _FaceNeighbourhoods(_bundles(points), surfaces.frames[:, 2])
+        return [_Beyond(faces, place, 1, error if inside else None)]
 
     @cached_property
     def _replaced(self) -> dict[int, list[_Beyond]]:
@@ -289,11 +305,15 @@ class _FaceNeighbourhoods:
 
 
 class _Beyond(NamedTuple):
-    """Neighbourhoods of `reach` rings that go on beyond the border, and the places of vertices in them."""
+    """Neighbourhoods of `reach` rings that go on beyond the border, and the places of vertices in them.
+
+    Where there is an `error`, of H by these, they are taken if that of the one-sided fit is clearly larger.
+    """
 
     faces: _FaceNeighbourhoods
     place: Indices
     reach: int
+    error: Floats | None = None
 
 
 def _continued(stencils: Stencils, layers: int) -> list[_Beyond]:
@@ -326,6 +346,14 @@ def _continued(stencils: Stencils, layers: int) -> list[_Beyond]:
     place = np.full(stencils.n, -1)
     place[kept[chosen]] = chosen
     return [_Beyond(_FaceNeighbourhoods(ghosted), place, layers)]
+
+
+def _with_neighbours(stencils: Stencils, chosen: Bools) -> Bools:
+    """Vertices and those of the faces around them."""
+    corners = np.where(stencils.faces < 0, stencils.faces[:, :1], stencils.faces)
+    near = np.pad(chosen, (0, len(stencils.points) - stencils.n))
+    near[corners[near[corners].any(axis=1)]] = True
+    return near[: stencils.n]
 
 
 def _bundles(points: Floats) -> Stencils:

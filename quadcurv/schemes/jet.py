@@ -105,7 +105,7 @@ def jet(degree: int | Literal["auto"] | None = None, rings: int | None = None) -
 
 def _curvatures(around: Neighbourhoods, degree: int, rings: int) -> Curvatures:
     def run(vertices: Indices, d: int, r: int) -> Floats:
-        return around.polynomials(vertices, d, r, ghosts=r == rings)
+        return around.polynomials(vertices, d, r, ghosts=r <= rings <= 2)
 
     return _unpacked(*_fits(around.wanted, run, degree, rings))
 
