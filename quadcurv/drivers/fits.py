@@ -25,13 +25,13 @@ from quadcurv.boundary import (
     poles,
     welded,
 )
+from quadcurv.drivers.features import Features, features
 from quadcurv.mesh import Mesh, QuadGrid, QuadMesh, StaggeredGrid
 from quadcurv.schemes import Curvatures, Fit, StandardErrors
 from quadcurv.stencils import Stencils
 from quadcurv.types import Bools, Floats, Indices, Ints
 
 _GHOST_DEGREE, _GHOST_LAYERS = 5, 3
-_ROUND = 1  # of jet.KINDS, which is not loaded before it is needed
 _ROUNDING = 2.0**-49  # of positions, and of what is computed from them
 _SURE = 0.01
 # Of one fit, in vertices of the finite-volume scheme.
@@ -81,11 +81,14 @@ class MeshNeighbourhoods:
         """(k, COLUMNS): see `Neighbourhoods`."""
         from quadcurv.kernels import jet
 
-        # Windows have the normals of their rings alone.
-        own = self._faces if self._windows is None or kind == _ROUND else self._windows
+        one_sided = kind != jet.PLAIN and bool((self.on_crease | self.on_jump).any())
+        if one_sided:
+            own: _GridNeighbourhoods | _FaceNeighbourhoods = self._sides
+        else:  # windows have the normals of their rings alone
+            own = self._faces if self._windows is None or kind == jet.ROUND else self._windows
         out = own.polynomials(vertices, degree, rings, kind)
         for faces, place, reach, error in (*(self._beyond(rings) if ghosts else ()), *self._at_poles(rings)):
-            at = place[vertices]
+            at = np.where(self._at_crease[vertices], -1, place[vertices]) if one_sided else place[vertices]
             if error is not None:  # one-sided fits follow a smooth surface as well, but magnify noise
                 if kind == jet.SMOOTH:
                     continue  # which the scheme looks at itself
@@ -141,6 +144,33 @@ class MeshNeighbourhoods:
     @cached_property
     def _faces(self) -> _FaceNeighbourhoods:
         return _FaceNeighbourhoods(self.stencils, present=self.present)
+
+    @cached_property
+    def on_crease(self) -> Bools:
+        """(n,): see `Neighbourhoods`."""
+        return self._features.creases & self.present
+
+    @cached_property
+    def on_jump(self) -> Bools:
+        """(n,): see `Neighbourhoods`."""
+        return self._features.jumps & self.present & ~self.on_crease
+
+    @cached_property
+    def _features(self) -> Features:
+        return features(self.stencils)
+
+    @cached_property
+    def _at_crease(self) -> Bools:
+        """(n,): what ghosts would continue across a crease."""
+        near = (self.on_crease | self.on_jump).astype(np.float64)
+        for _ in range(_GHOST_LAYERS):
+            near = self._adjacency @ near
+        return near > 0
+
+    @cached_property
+    def _sides(self) -> _FaceNeighbourhoods:
+        """Rings that end at creases and jumps of curvature."""
+        return _FaceNeighbourhoods(self.stencils, present=self.present & ~(self.on_crease | self.on_jump))
 
     @cached_property
     def _windows(self) -> _GridNeighbourhoods | None:
@@ -463,5 +493,5 @@ def _turned(found: Curvatures, turn: Bools) -> Curvatures:
     )
     return Curvatures(
         signed(found.mean), found.gaussian, signed(k1), signed(k2), direction1, direction2,
-        signed(found.normal), errors, bars, found.noise, found.degree, found.rings,
+        signed(found.normal), errors, bars, found.noise, found.degree, found.rings, found.feature,
     )  # fmt: skip

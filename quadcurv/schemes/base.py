@@ -125,6 +125,9 @@ class Curvatures:
         Standard deviation of the positions along the normal, from the residuals, in length.
     degree, rings : int32 or None
         Degree and neighbourhood of the fit at each vertex, 0 where there is none.
+    feature : bool or None
+        Vertices on creases: the surface has no curvature there, and what is given grows as the mesh is
+        refined. Fits beside a crease look at their own side of it. Of "jet" alone.
 
     Examples
     --------
@@ -146,6 +149,7 @@ class Curvatures:
     noise: Floats | None = None
     degree: Ints | None = None
     rings: Ints | None = None
+    feature: Bools | None = None
 
     def __repr__(self) -> str:
         known = self.mean[np.isfinite(self.mean)]
@@ -195,6 +199,8 @@ class Neighbourhoods(Protocol):
         `polynomials` did it; NaN elsewhere.
     rounding : float
         Of the positions, in length.
+    on_crease, on_jump : (n,) bool
+        Vertices on creases, and on lines at which the curvature jumps; round neighbourhoods end at both.
     """
 
     @property
@@ -206,6 +212,10 @@ class Neighbourhoods(Protocol):
     def border_error(self) -> Floats: ...  # noqa: D102
     @property
     def rounding(self) -> float: ...  # noqa: D102
+    @property
+    def on_crease(self) -> Bools: ...  # noqa: D102
+    @property
+    def on_jump(self) -> Bools: ...  # noqa: D102
 
     def polynomials(
         self, vertices: Indices, degree: int, rings: int, ghosts: bool = True, kind: int = 0

@@ -33,6 +33,8 @@ _RESOLVED = 5.0
 _WIDE = ((6, 3), (4, 3), (4, 4), (4, 5), (2, 3), (2, 4))
 _CHANCE = 0.2  # of the noise's square, that means over two rings of neighbours may be off
 _QUANTILE = 0.975
+_SMALLER = ((4, 2), (2, 1))
+_DOUBT = 0.02  # of the curvature, from which errors on others are asked
 _FAR = 6  # rings over which noise is looked for where all is steep
 
 
@@ -81,7 +83,7 @@ class _Found:
         noise = stdtrit(self.freedom[at], _QUANTILE)[:, None] * gain * self.sigma[at, None]
         return np.hypot(np.nan_to_num(noise), 2 * self.bias[at])
 
-    def curvatures(self) -> Curvatures:
+    def curvatures(self, on_crease: Bools) -> Curvatures:
         """What is known."""
         kernel, out = self.kernel, self.values
         errors = out[:, kernel.GAIN : kernel.GAIN + 4] * self.sigma[:, None]
@@ -99,6 +101,7 @@ class _Found:
             noise=self.sigma,
             degree=self.degree,
             rings=self.rings,
+            feature=on_crease,
         )
 
 
@@ -107,9 +110,15 @@ def chosen(around: Neighbourhoods) -> Curvatures:
     from quadcurv.kernels import jet as kernel
 
     found = _Found(around)
-    vertices = np.flatnonzero(around.wanted)
+    feature = around.on_crease | around.on_jump
+    creased = np.flatnonzero(around.wanted & feature)
+    if creased.size:
+        here = around.polynomials(creased, 2, 1, False)
+        known = here[:, kernel.CONDITION] <= _CONDITION[2]
+        found.put_noisy(creased[known], here[known], 2, 1, np.zeros(known.sum()))
+    vertices = np.flatnonzero(around.wanted & ~feature)
     if vertices.size == 0:
-        return found.curvatures()
+        return found.curvatures(around.on_crease)
     fits = around.polynomials(vertices, 6, 3, kind=kernel.SMOOTH)
     good = (fits[:, kernel.CONDITION] <= _CONDITION[6]) & np.isnan(around.border_error[vertices])
     noisy = good & ~_resolved(fits, 6, around.rounding)
@@ -120,7 +129,27 @@ def chosen(around: Neighbourhoods) -> Curvatures:
         steep = vertices[np.isnan(fits[:, kernel.CONDITION])]
         noisy = np.union1d(noisy, _steep_by_noise(around, steep, noisy))
         _average(around, noisy, found)
-    return found.curvatures()
+    _doubted(around, np.setdiff1d(vertices[good], noisy), found)
+    return found.curvatures(around.on_crease)
+
+
+def _doubted(around: Neighbourhoods, vertices: Indices, found: _Found) -> None:
+    """Take smaller neighbourhoods where those of three rings are off and these are not, as far as they tell.
+
+    At jumps of curvature, where an arc ends in a tangent, and on meshes too coarse for three rings.
+    """
+    from quadcurv.kernels import jet as kernel
+
+    size = np.maximum(np.abs(found.values[vertices, kernel.K1]), np.abs(found.values[vertices, kernel.K2]))
+    vertices = vertices[found.errors(vertices)[:, 0] > _DOUBT * size]
+    for d, r in _SMALLER:
+        if vertices.size == 0:
+            return
+        fits, other = around.polynomials(vertices, d, r, kind=kernel.SMOOTH), _Found(around)
+        other.put(vertices, fits, d, r)
+        better = other.errors(vertices)[:, 0] < found.errors(vertices)[:, 0]
+        better &= fits[:, kernel.CONDITION] <= _CONDITION[d]
+        found.put(vertices[better], fits[better], d, r)
 
 
 def _steep_by_noise(around: Neighbourhoods, steep: Indices, noisy: Indices) -> Indices:
