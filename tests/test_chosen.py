@@ -5,10 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from scipy.stats import spearmanr
-from test_jet import noisy, sampled
+from test_jet import box, noisy, sampled
 
 import quadcurv as qc
 from quadcurv import surfaces
+from quadcurv.drivers.fits import MeshNeighbourhoods
 from quadcurv.estimate import disagreement
 from quadcurv.refinement import fitted_rate
 from quadcurv.schemes import jet
@@ -113,6 +114,74 @@ def test_coarse_ellipsoids(n, bound):
 def test_low_cylinders(shape, bound):
     grid, _, _ = surfaces.cylinder().sample(shape)
     assert np.abs(qc.mean_curvature(grid) - 0.5).max() < bound
+
+
+# ---- creases, and jumps of curvature -------------------------------------------------------------------
+
+
+def roof(degrees, n=33, curved=1.0):
+    """Two halves of z = -s |x| - y^2 / 2 that meet at an angle, and H of each."""
+    slope = np.tan(np.radians(degrees) / 2)
+    x, y = np.meshgrid(*[np.linspace(-1, 1, n)] * 2, indexing="ij")
+    x = x / np.hypot(1, slope)
+    grid = qc.QuadGrid(np.stack((x, y, -slope * np.abs(x) - curved * y * y / 2), axis=-1))
+    return grid, (1 + slope**2) * curved / (2 * (1 + slope**2 + (curved * y) ** 2) ** 1.5)
+
+
+@pytest.mark.parametrize("degrees", [10, 30, 60, 90])
+@pytest.mark.parametrize("layout", ["grid", "faces"])
+def test_creases_are_flagged_and_not_looked_across(degrees, layout):
+    grid, exact = roof(degrees)
+    found = qc.curvatures(grid if layout == "grid" else grid.to_mesh())
+    feature, mean = (x.reshape(grid.shape) for x in (found.feature, found.mean))
+    assert np.array_equal(feature.any(axis=1), np.arange(33) == 16)
+    assert feature[16].all()
+    error, best = np.abs(mean - exact), np.abs(qc.mean_curvature(grid, "liu") - exact)
+    assert error[[15, 17], 4:-4].max() < 5e-6 < best[[15, 17], 4:-4].max() / 10
+
+
+def test_flat_sides_of_a_cube_are_flat():
+    mesh, sides = box(5)
+    found = qc.curvatures(mesh)
+    assert np.array_equal(found.feature, sides > 1)
+    assert np.abs(found.mean[sides == 1]).max() < 1e-12
+    assert (found.mean[sides > 1] > 4.5).all()
+
+
+@pytest.mark.parametrize("cells", [4, 8])
+def test_fillets(cells):
+    """An arc between its two tangents, of H = 0, 1 / 2 and 0."""
+    s, t = np.linspace(-1, 0, 11)[:-1], np.linspace(0, np.pi / 2, cells + 1)
+    profile = np.concatenate(
+        [
+            np.stack([s, 0 * s + 1], axis=1),
+            np.stack([np.sin(t), np.cos(t)], axis=1),
+            np.stack([0 * s + 1, s], axis=1)[::-1],
+        ]
+    )
+    x, y = np.meshgrid(np.arange(len(profile)), np.linspace(0, 2, 21), indexing="ij")
+    grid = qc.QuadGrid(np.stack((profile[x, 0], y, profile[x, 1]), axis=-1)[:, ::-1])
+    found = qc.curvatures(grid)
+    flat = np.r_[0:9, len(profile) - 9 : len(profile)]
+    assert np.abs(found.mean[flat]).max() < 1e-9
+    assert np.abs(np.abs(found.mean[11 : 10 + cells]) - 0.5).max() < 0.03
+    assert not found.feature.any()
+
+
+@pytest.mark.parametrize("name", surfaces.SURFACES)
+def test_nothing_smooth_is_a_feature(name):
+    for n in (16, 64):
+        mesh, _, _ = surfaces.SURFACES[name]().sample((n, n), "faces" if "cubed" in name else "grid")
+        around = MeshNeighbourhoods(mesh, "nan")
+        assert not around.on_crease.any()
+        assert not around.on_jump.any()
+
+
+@pytest.mark.parametrize("noise", [1e-3, 1e-2, 5e-2])
+def test_noise_is_no_feature(noise):
+    mesh, _ = noisy("cubed_ellipsoid", 24, noise)
+    around = MeshNeighbourhoods(mesh, "nan")
+    assert around.on_crease.sum() + around.on_jump.sum() < 5
 
 
 # ---- error bars ----------------------------------------------------------------------------------------

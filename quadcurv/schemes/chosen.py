@@ -23,7 +23,8 @@ _LAST = (1, 2, 3, 4)  # rings of quadratic fits
 # Most that errors in height, of unit mean square, may grow to in the second derivatives, both in units of
 # the neighbourhood's extent; regular neighbourhoods have 40, 16 and 4.
 _CONDITION = {6: 500.0, 4: 160.0, 2: 40.0}
-_ONE_SIDED = {6: 1e4, 4: 1e3}
+# The same of one-sided fits; over fewer rows than one more than the degree what they leave out is not seen.
+_ONE_SIDED = {(6, 3): 2e3, (6, 4): 2e3, (6, 5): 1e4, (4, 2): 1e3, (4, 3): 1e3, (4, 4): 1e3}
 # What noise leaves of its square in weighted residuals, and their degrees of freedom, both per point more
 # than terms: measured on quads and triangles, jittered or not, at valences 3 to 5.
 _LEFT = {6: (0.41, 0.67), 4: (0.31, 0.62), 2: (0.06, 0.57)}
@@ -121,10 +122,10 @@ def chosen(around: Neighbourhoods) -> Curvatures:
         return found.curvatures(around.on_crease)
     fits = around.polynomials(vertices, 6, 3, kind=kernel.SMOOTH)
     good = (fits[:, kernel.CONDITION] <= _CONDITION[6]) & np.isnan(around.border_error[vertices])
-    noisy = good & ~_resolved(fits, 6, around.rounding)
+    unresolved = good & ~_resolved(fits, 6, around.rounding)
     at = slice(None) if good.all() else good
     found.put(vertices[at], fits[at], 6, 3)
-    noisy = np.concatenate((vertices[noisy], _at_sides(around, vertices[~good], fits[~good], found)))
+    noisy = np.concatenate((vertices[unresolved], _at_sides(around, vertices[~good], fits[~good], found)))
     if noisy.size:
         steep = vertices[np.isnan(fits[:, kernel.CONDITION])]
         noisy = np.union1d(noisy, _steep_by_noise(around, steep, noisy))
@@ -177,7 +178,7 @@ def _at_sides(around: Neighbourhoods, vertices: Indices, first: Floats, found: _
     fits, beyond, errors, noisy = [], [], [], np.zeros(vertices.size, bool)
     for d, r, ghosts in _SIDES:
         here = first if (d, r) == (6, 3) else around.polynomials(vertices, d, r, ghosts, kernel.SMOOTH)
-        good = here[:, kernel.CONDITION] <= _ONE_SIDED[d]
+        good = here[:, kernel.CONDITION] <= _ONE_SIDED[d, r]
         if ghosts:  # points beyond a border are never too steep: look at those that are there
             there = around.polynomials(vertices, 2, r, False, kernel.SMOOTH)
             good &= ~np.isnan(there[:, kernel.CONDITION])
