@@ -17,6 +17,7 @@ from .curvature import stiffness_matrix as stiffness_matrix
 from .curvature import vertex_normals as vertex_normals
 from .io import as_mesh as as_mesh
 from .io import attach as attach
+from .io import from_xarray as from_xarray
 from .io import read as read
 from .io import read_values as read_values
 from .io import to_pymeshlab as to_pymeshlab
@@ -24,6 +25,7 @@ from .io import to_pyvista as to_pyvista
 from .io import to_trimesh as to_trimesh
 from .io import write as write
 from .kernels.ranges import set_threads as set_threads
+from .mesh import ChunkedGrid as ChunkedGrid
 from .mesh import GridBlocks as GridBlocks
 from .mesh import QuadGrid as QuadGrid
 from .mesh import QuadMesh as QuadMesh

@@ -110,12 +110,11 @@ def checked_points(points: ArrayLike, name: str, shape: tuple[Any, ...]) -> Floa
 
     if is_on_device(points):
         return _checked_on_device(points, name, shape)
+    _refuse_elsewhere(points, name)
     try:
         given = np.asarray(points)
     except (ValueError, OverflowError):  # rows of different lengths, integers beyond all floats
         given = np.empty(0, object)
-    if hasattr(points, "__dask_graph__"):
-        raise MeshError(f"{name}: a lazy array ({type(points).__name__}), expected one in memory")
     if np.ma.is_masked(points):
         raise MeshError(f"{name}: masked entries, expected a number in each")
     if given.dtype.kind not in "fiu":
@@ -167,6 +166,18 @@ def _checked_on_device(points: Any, name: str, shape: tuple[Any, ...]) -> Any:
     return array
 
 
+def _refuse_elsewhere(points: Any, name: str) -> None:
+    """Refuse what is not in memory, before anything loads it."""
+    graph = getattr(points, "__dask_graph__", None)
+    lazy = graph is not None and graph() is not None
+    on_disk = type(points).__module__.partition(".")[0] in ("h5py", "zarr") and hasattr(points, "dtype")
+    if lazy or on_disk:
+        raise MeshError(
+            f"{name}: a lazy array ({type(points).__name__}), expected one in memory: "
+            "qc.ChunkedGrid computes it block by block"
+        )
+
+
 def unit_roundoff(points: ArrayLike) -> float:
     """Relative rounding error of positions as they are given; integers have that of doubles."""
     dtype = getattr(points, "dtype", np.dtype(float))
@@ -175,6 +186,7 @@ def unit_roundoff(points: ArrayLike) -> float:
 
 def masked_points(points: Any, mask: ArrayLike | None) -> tuple[Floats, Bools | None, list[Finding]]:
     """Points of a grid, NaN where masked; the mask if it hides any; what is NaN without being masked."""
+    _refuse_elsewhere(points, "points")
     given = np.ma.getdata(points) if isinstance(points, np.ma.MaskedArray) else points
     findings: list[Finding] = []
     if is_on_device(points):

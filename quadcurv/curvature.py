@@ -11,11 +11,12 @@ from numpy.typing import ArrayLike
 
 from quadcurv import drivers
 from quadcurv.boundary import one_rings
-from quadcurv.io import as_mesh
-from quadcurv.mesh import GridBlocks, Mesh, StaggeredGrid
+from quadcurv.drivers import parts
+from quadcurv.io import as_mesh, as_mesh_or_chunks
+from quadcurv.mesh import ChunkedGrid, GridBlocks, Mesh, StaggeredGrid
 from quadcurv.precision import warn_of_rounding
 from quadcurv.schemes import Curvatures, Fit, Laplacian, Scheme, SchemeName, as_scheme
-from quadcurv.schemes.angle_defect import angle_defect
+from quadcurv.schemes.angle_defect import gaussian_curvature as angle_gaussian_curvature
 from quadcurv.types import Floats
 
 DEFAULT = "jet"
@@ -78,7 +79,11 @@ def curvatures(
     >>> bool(np.abs(found.k1 - 0.5).max() < 5e-3)
     True
     """
-    return _split(mesh, _fitted(_taken(mesh), _as_fit(scheme), boundary))
+    chosen = _as_fit(scheme)
+    mesh = parts.in_parts(_taken(mesh), chosen)
+    if isinstance(mesh, ChunkedGrid):
+        return parts.curvatures(mesh, chosen, boundary)
+    return _split(mesh, _fitted(mesh, chosen, boundary))
 
 
 def principal_curvatures(
@@ -109,7 +114,11 @@ def principal_curvatures(
     >>> bool(np.abs(k1 - 1).max() < 5e-3 and np.abs(k2).max() < 5e-3)
     True
     """
-    found = _fitted(_taken(mesh), _as_fit(scheme), boundary)
+    chosen = _as_fit(scheme)
+    mesh = parts.in_parts(_taken(mesh), chosen)
+    if isinstance(mesh, ChunkedGrid):
+        return PrincipalCurvatures(*parts.principal_curvatures(mesh, chosen, boundary))
+    found = _fitted(mesh, chosen, boundary)
     return PrincipalCurvatures(
         *(_split(mesh, x) for x in (found.k1, found.k2, found.direction1, found.direction2))
     )
@@ -161,7 +170,10 @@ def mean_curvature(
     >>> bool(np.abs(qc.mean_curvature(ball) - 0.5).max() < 5e-3)
     True
     """
-    mesh, chosen = _taken(mesh), as_scheme(scheme)
+    chosen = as_scheme(scheme)
+    mesh = parts.in_parts(_taken(mesh), chosen)
+    if isinstance(mesh, ChunkedGrid):
+        return parts.verb(mesh, "mean_curvature", chosen, boundary)
     if isinstance(chosen, Fit):
         return _split(mesh, _fitted(mesh, chosen, boundary).mean)
     H = drivers.run(mesh, chosen, ["mean_curvature"], boundary)["mean_curvature"]
@@ -198,7 +210,10 @@ def mean_curvature_normal(
     >>> bool((np.einsum("ijx,ijx->ij", Hn, ball.points) < 0).all())
     True
     """
-    mesh, chosen = _taken(mesh), as_scheme(scheme)
+    chosen = as_scheme(scheme)
+    mesh = parts.in_parts(_taken(mesh), chosen)
+    if isinstance(mesh, ChunkedGrid):
+        return parts.verb(mesh, "mean_curvature_normal", chosen, boundary)
     if isinstance(chosen, Fit):
         fits = _fitted(mesh, chosen, boundary)
         return _split(mesh, -fits.mean[..., None] * fits.normal)
@@ -238,16 +253,16 @@ def gaussian_curvature(
     >>> bool(np.abs(qc.gaussian_curvature(ball) - 0.25).max() < 5e-3)
     True
     """
-    mesh = _taken(mesh)
-    if not (isinstance(scheme, str) and scheme == "angle_defect"):
-        return _split(mesh, _fitted(mesh, _as_fit(scheme), boundary).gaussian)
+    angles = isinstance(scheme, str) and scheme == "angle_defect"
+    chosen = scheme if angles else _as_fit(scheme)
+    mesh = parts.in_parts(_taken(mesh), chosen)
+    if isinstance(mesh, ChunkedGrid):
+        return parts.verb(mesh, "gaussian_curvature", chosen, boundary)
+    if isinstance(chosen, Fit):
+        return _split(mesh, _fitted(mesh, chosen, boundary).gaussian)
     if drivers.device.holds(mesh):
         raise ValueError("scheme: angle_defect does not run on a device; give it positions in memory")
-    stencils = one_rings(mesh.mesh if isinstance(mesh, GridBlocks) else mesh, boundary)
-    defect, area = angle_defect(stencils)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        K = defect / area
-    K[~stencils.closed | ~np.isfinite(K)] = np.nan
+    K = angle_gaussian_curvature(one_rings(mesh.mesh if isinstance(mesh, GridBlocks) else mesh, boundary))
     return _split(mesh, K[: mesh.n] if isinstance(mesh, GridBlocks) else mesh.in_shape(K))
 
 
@@ -348,7 +363,7 @@ def stiffness_matrix(
     >>> bool(np.abs(S.sum(axis=1)).max() < 1e-12)
     True
     """
-    return drivers.stiffness(_taken(mesh), _as_laplacian(scheme), out)
+    return drivers.stiffness(_in_memory(mesh), _as_laplacian(scheme), out)
 
 
 def mass_matrix(mesh: Any, scheme: SchemeName | str | Scheme = DEFAULT_MATRIX) -> scipy.sparse.dia_array:
@@ -375,7 +390,7 @@ def mass_matrix(mesh: Any, scheme: SchemeName | str | Scheme = DEFAULT_MATRIX) -
     >>> qc.mass_matrix(ball).shape
     (386, 386)
     """
-    mesh = _taken(mesh)
+    mesh = _in_memory(mesh)
     if drivers.device.holds(mesh):
         return drivers.device.mass_matrix(dual_areas(mesh, scheme))
     return scipy.sparse.diags_array(mesh.flat(dual_areas(mesh, scheme)))
@@ -418,6 +433,8 @@ def laplace_beltrami(mesh: Any, f: ArrayLike, scheme: SchemeName | str | Scheme 
     True
     """
     mesh, chosen = _taken(mesh), _as_laplacian(scheme)
+    if isinstance(mesh, ChunkedGrid):
+        return parts.laplace_beltrami(mesh, f, chosen)
     if drivers.device.holds(mesh):
         return drivers.device.laplace_beltrami(mesh, f, chosen)
     stencils = mesh.stencils()
@@ -428,17 +445,12 @@ def laplace_beltrami(mesh: Any, f: ArrayLike, scheme: SchemeName | str | Scheme 
     if drivers.has_holes(mesh):
         if given.shape[:2] != mesh.shape:
             raise ValueError(f"f: shape {given.shape}, expected {mesh.shape} or {(*mesh.shape, 'k')}")
-        return mesh.in_shape(laplace_beltrami(mesh.to_mesh(), mesh.flat(given), chosen))
+        return mesh.in_shape(drivers.apply(mesh.to_mesh(), chosen, mesh.flat(given)))
     lead = (len(stencils.points),) if isinstance(mesh, StaggeredGrid | GridBlocks) else stencils.shape
     if given.shape[: len(lead)] != lead or given.ndim > len(lead) + 1:
         raise ValueError(f"f: shape {given.shape}, expected {lead} or {(*lead, 'k')}")
     values = given.reshape(len(stencils.points), *given.shape[len(lead) :])
-    areas = drivers.run(mesh, chosen, ["dual_areas"], "nan")["dual_areas"]
-    result = drivers.stiffness(mesh, chosen) @ (values - values[:1])
-    with np.errstate(divide="ignore", invalid="ignore"):
-        result /= -areas.reshape(-1, *[1] * (values.ndim - 1))
-    result[~stencils.closed] = np.nan
-    result[~np.isfinite(result)] = np.nan
+    result = drivers.apply(mesh, chosen, values)
     return _split(mesh, result.reshape(*stencils.shape, *values.shape[1:]))
 
 
@@ -447,8 +459,9 @@ def evaluate(
     *wanted: str,
     scheme: SchemeName | str | Scheme = "finite_volume",
     boundary: str = "extrapolate",
-    out: Mapping[str, Floats] | None = None,
-) -> dict[str, Floats]:
+    out: Mapping[str, Any] | None = None,
+    progress: bool = False,
+) -> dict[str, Any]:
     """Several of the verbs in one pass, into arrays of the caller's if there are any.
 
     Parameters
@@ -458,9 +471,15 @@ def evaluate(
     *wanted : {"mean_curvature", "mean_curvature_normal", "vertex_normals", "dual_areas"}
         Names of verbs.
     scheme : str or Laplacian
-        A fit gives none of these; :func:`curvatures` has what it gives.
+        A fit gives none of these; :func:`curvatures` has what it gives. Of a :class:`ChunkedGrid` it may be a
+        fit, which gives "mean_curvature", "mean_curvature_normal", "gaussian_curvature", "k1", "k2",
+        "direction1", "direction2", "normal", "standard_error" (r, c, 4) of H, K, k1 and k2, "noise",
+        "degree" and "rings".
     out : mapping from name to float64 array, optional
-        C-contiguous arrays of the shape of the result, to be written to. Others are allocated.
+        C-contiguous arrays of the shape of the result, to be written to. Others are allocated. Of a
+        :class:`ChunkedGrid` anything that takes slices, such as a zarr array or a ``numpy.memmap``.
+    progress : bool
+        Whether to show how many blocks of a :class:`ChunkedGrid` are done, on standard error.
 
     Returns
     -------
@@ -480,14 +499,21 @@ def evaluate(
     >>> sorted(qc.evaluate(ball, "mean_curvature", "dual_areas"))
     ['dual_areas', 'mean_curvature']
     """
-    mesh = _taken(mesh)
-    found = drivers.run(mesh, _as_laplacian(scheme), wanted, boundary, out)
+    mesh, chosen = _taken(mesh), as_scheme(scheme)
+    if isinstance(mesh, ChunkedGrid):
+        return parts.evaluate(mesh, wanted, chosen, boundary, out, progress)
+    found = drivers.run(mesh, _as_laplacian(chosen), wanted, boundary, out)
     return {name: _split(mesh, values) for name, values in found.items()}
 
 
-def _taken(mesh: Any) -> Any:
-    """What a verb is asked of, as the drivers take it."""
+def _in_memory(mesh: Any) -> Any:
+    """What a matrix is asked of, as the drivers take it."""
     return mesh if isinstance(mesh, GridBlocks) else as_mesh(mesh)
+
+
+def _taken(mesh: Any) -> Any:
+    """What a verb is asked of, as the drivers take it; grids that are not in memory, too."""
+    return mesh if isinstance(mesh, GridBlocks) else as_mesh_or_chunks(mesh)
 
 
 def _split(mesh: Any, values: Any) -> Any:

@@ -12,6 +12,10 @@ _EXTRAS = {
     "meshlane": "formats",
     "pymeshlab": "meshlab",
     "pandas": "notebook",
+    "dask": "scale",
+    "h5py": "scale",
+    "xarray": "scale",
+    "zarr": "scale",
 }
 
 

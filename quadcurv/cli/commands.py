@@ -12,6 +12,7 @@ from cyclopts import Parameter
 from rich.console import Console
 
 from quadcurv import viewing
+from quadcurv.cli.arrays import curvature_of_array
 from quadcurv.cli.inputs import Input, load
 from quadcurv.cli.options import (
     MeshOptions,
@@ -28,7 +29,7 @@ from quadcurv.comparison import Comparison
 from quadcurv.comparison import compare as compared
 from quadcurv.extras import missing, need
 from quadcurv.io import write
-from quadcurv.io.base import FORMATS
+from quadcurv.io.base import FORMATS, STORES
 from quadcurv.mesh import Mesh
 from quadcurv.mesh_quality import summary
 from quadcurv.schemes import SCHEMES
@@ -116,19 +117,25 @@ def curvature(
 
         quadcurv curvature spot.obj -o spot.ply
         quadcurv curvature spot.obj -o spot.csv -s liu -v mean_curvature -v valence
+        quadcurv curvature grid.zarr -o H.zarr -s finite_volume
 
     Parameters
     ----------
     mesh
-        File of a mesh of quads, or of quads and other polygons.
+        File of a mesh of quads, or of quads and other polygons. A grid's array of points (.zarr, .npy, .h5)
+        is read and written block by block, of any size; with --wrap its first row is not repeated.
     output
-        File to write: a mesh with values, or .csv with a row a vertex, in the order of the file's vertices.
+        File to write: a mesh with values, or .csv with a row a vertex, in the order of the file's vertices;
+        of an array a new .zarr, .npy or .h5.
     scheme
         Of the mean curvature. All other curvatures are its too if it is a jet, else those of "jet".
     value
-        Value to write, repeatable; by default all.
+        Value to write, repeatable; by default all, of an array the mean curvature.
     """
     check_schemes([scheme])
+    if mesh.suffix.lower() in STORES:
+        say(curvature_of_array(mesh, output, scheme, value, options))
+        return
     holders = sorted(suffix for suffix, entry in FORMATS.items() if entry.write and entry.holds_values)
     check_file(output, "--output", [".csv", *holders])
     found = load(mesh, options)

@@ -17,13 +17,13 @@ from quadcurv.schemes import Curvatures, Fit, Laplacian
 from quadcurv.stencils import Stencils
 from quadcurv.types import Floats
 
-__all__ = ["each", "fit", "has_holes", "run", "stiffness"]
+__all__ = ["apply", "each", "fit", "has_holes", "run", "stiffness"]
 
 
 # The quads of a staggered grid cover it twice, once for its cells and once for their corners: so that the
 # dual area of a cell is its area, matrix and areas are twice those of a mesh of these quads.
 _CELLS = 2.0
-_DOUBLE = 2.0**-53  # unit roundoff
+DOUBLE = 2.0**-53  # unit roundoff
 
 
 def fit(mesh: Mesh | GridBlocks, scheme: Fit, boundary: str = "extrapolate") -> Curvatures:
@@ -43,8 +43,12 @@ def run(
     wanted: Iterable[str],
     boundary: str = "extrapolate",
     out: Mapping[str, Floats] | None = None,
+    size: float | None = None,
 ) -> dict[str, Floats]:
-    """Results by name (see `direct.PER_VERTEX`), into the arrays of `out` where there are any."""
+    """Results by name (see `direct.PER_VERTEX`), into the arrays of `out` where there are any.
+
+    `size` is the largest coordinate of what the mesh is a part of.
+    """
     if device.holds(mesh):
         return device.evaluate(mesh, scheme, wanted, boundary, out)  # type: ignore[arg-type]
     checked_boundary(boundary)
@@ -63,22 +67,23 @@ def run(
     if _of_cells(mesh) and "dual_areas" in results:
         results["dual_areas"] *= _CELLS
     one = mesh.mesh if isinstance(mesh, GridBlocks) and not mesh.of_cells else mesh
-    if mesh.roundoff > _DOUBLE and not has_holes(mesh) and not isinstance(one, GridBlocks):
-        far = run(_far_away(one, mesh.roundoff), scheme, results.keys() - {"dual_areas"}, boundary)
+    if mesh.roundoff > DOUBLE and not has_holes(mesh) and not isinstance(one, GridBlocks):
+        far = run(far_away(one, mesh.roundoff, size), scheme, results.keys() - {"dual_areas"}, boundary)
         for name, values in far.items():
             results[name][np.isnan(values)] = np.nan
     return results
 
 
-def _far_away(mesh: Mesh, roundoff: float) -> Mesh:
+def far_away(mesh: Mesh, roundoff: float, size: float | None = None) -> Mesh:
     """The mesh so far from the origin that its positions are rounded, in double precision, as those given.
 
     What has no area but for rounding is then NaN by the same test as everywhere.
     """
     moved, arrays = copy.copy(mesh), mesh.arrays()
-    size = max(float(np.abs(x).max()) for x in arrays.values())
-    far = {name: x + size * roundoff / _DOUBLE for name, x in arrays.items()}
-    moved.__dict__.update(far, roundoff=_DOUBLE)
+    if size is None:
+        size = max(float(np.abs(x).max()) for x in arrays.values())
+    far = {name: x + size * roundoff / DOUBLE for name, x in arrays.items()}
+    moved.__dict__.update(far, roundoff=DOUBLE)
     return moved
 
 
@@ -109,6 +114,18 @@ def stiffness(
 
 def _of_cells(mesh: Mesh | GridBlocks) -> bool:
     return isinstance(mesh, StaggeredGrid) or (isinstance(mesh, GridBlocks) and mesh.of_cells)
+
+
+def apply(mesh: Mesh | GridBlocks, scheme: Laplacian, values: Floats, origin: Floats | None = None) -> Floats:
+    """(n, ...) Laplace-Beltrami operator of functions (p, ...) less `origin`, else their first value."""
+    stencils = mesh.stencils()
+    areas = run(mesh, scheme, ["dual_areas"], "nan")["dual_areas"]
+    result = stiffness(mesh, scheme) @ (values - (values[:1] if origin is None else origin))
+    with np.errstate(divide="ignore", invalid="ignore"):
+        result /= -areas.reshape(-1, *[1] * (values.ndim - 1))
+    result[~stencils.closed] = np.nan
+    result[~np.isfinite(result)] = np.nan
+    return result
 
 
 def has_holes(mesh: Mesh | GridBlocks) -> TypeGuard[QuadGrid]:

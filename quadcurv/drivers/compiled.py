@@ -109,7 +109,7 @@ def evaluate_rows(
 ) -> Indices:
     """Run a pass over a grid; the border vertices that its frame does not serve.
 
-    Of cells the frame may be known: other grids' cells.
+    The frame may be known: cells of other grids, or points of the grid that this is cut from.
     """
     from quadcurv.kernels import cells, ranges, rows
     from quadcurv.kernels.compiled import flat
@@ -117,7 +117,9 @@ def evaluate_rows(
     wanted, liu = _wanted(results), diamond_of.area == "quads"
     r, c = grid.shape
     if isinstance(grid, QuadGrid):
-        around, unserved = frame(grid, boundary)
+        unserved = np.empty(0, np.int64)
+        if around is None:
+            around, unserved = frame(grid, boundary)
         kernel = partial(rows.grid_curvatures, flat(grid.points), 3 * c, *_flat(around), liu, *wanted)
     else:
         dual = grid.dual

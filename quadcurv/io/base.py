@@ -84,22 +84,52 @@ class Library:
         (mesh, name, values, colormap): see :func:`quadcurv.attach`.
     takes : callable or None
         Whether an object of other modules has what it takes; asked where no module fits.
+    is_array : callable or None
+        Whether an object of these modules is an array that is not in memory, the points of a ChunkedGrid.
     """
 
     modules: tuple[str, ...]
     content: Callable[[Any], Content]
     attach: Callable[[Any, str, NDArray[Any], str | None], None] | None = None
     takes: Callable[[Any], bool] | None = None
+    is_array: Callable[[Any], bool] | None = None
+
+
+@dataclass(frozen=True)
+class Store:
+    """A kind of file that holds an array, which is read and written in slices.
+
+    Attributes
+    ----------
+    suffixes : tuple of str
+        In lower case, with their dot.
+    open : callable
+        Path -> array with shape, dtype and slices. MeshError where there is no such array.
+    create : callable
+        (path, arrays) -> arrays to write to by name, of the shapes of float64 given by name, in a new file.
+    """
+
+    suffixes: tuple[str, ...]
+    open: Callable[[Path], Any]
+    create: Callable[[Path, Mapping[str, tuple[int, ...]]], dict[str, Any]]
 
 
 FORMATS: dict[str, Format] = {}
 LIBRARIES: dict[str, Library] = {}
+STORES: dict[str, Store] = {}
 
 
-def register(entry: Format | Library) -> None:
-    """Enter a format by its suffixes, a library by its modules."""
+def no_mesh(array: Any) -> Content:
+    """Refuse what a library holds that is no mesh."""
+    raise TypeError(f"mesh: {type(array).__module__}.{type(array).__qualname__} holds no mesh")
+
+
+def register(entry: Format | Library | Store) -> None:
+    """Enter a format or a store by its suffixes, a library by its modules."""
     if isinstance(entry, Format):
         FORMATS.update(dict.fromkeys(entry.suffixes, entry))
+    elif isinstance(entry, Store):
+        STORES.update(dict.fromkeys(entry.suffixes, entry))
     else:
         LIBRARIES.update(dict.fromkeys(entry.modules, entry))
 

@@ -13,11 +13,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from quadcurv.io.base import FORMATS, Content, checked_values, joined, library, warn
+from quadcurv.io.base import FORMATS, STORES, Content, checked_values, joined, library, warn
 from quadcurv.io.quads import quads_by_order
 from quadcurv.io.replacing import replacing
 from quadcurv.io.seams import closed_grid, warn_of_seam
-from quadcurv.mesh import GridBlocks, Mesh, QuadGrid, QuadMesh, Recovery, StaggeredGrid
+from quadcurv.mesh import ChunkedGrid, GridBlocks, Mesh, QuadGrid, QuadMesh, Recovery, StaggeredGrid
 from quadcurv.types import MeshError
 
 Wrap = Sequence[bool]
@@ -93,6 +93,27 @@ def as_mesh(mesh: Any, quads: ArrayLike | None = None, wrap: Wrap | None = None)
     >>> qc.as_mesh(([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], [[0, 1, 2, 3]]))
     QuadMesh(4 points, 1 quads)
     """
+    found = as_mesh_or_chunks(mesh, quads, wrap)
+    if isinstance(found, ChunkedGrid):
+        raise TypeError(
+            f"mesh: {found!r} is read block by block, which the verbs of curvature, qc.evaluate and "
+            "qc.laplace_beltrami do; all else wants it in memory: qc.QuadGrid(points[:])"
+        )
+    return found
+
+
+def as_mesh_or_chunks(mesh: Any, quads: ArrayLike | None = None, wrap: Wrap | None = None) -> Any:
+    """As as_mesh, or a ChunkedGrid of an array that is not in memory."""
+    if isinstance(mesh, ChunkedGrid):
+        _refuse(quads, wrap, "ChunkedGrid")
+        return mesh
+    if isinstance(mesh, str | os.PathLike) and (store := STORES.get(Path(mesh).suffix.lower())) is not None:
+        _refuse(quads, None, "grid on disk")
+        return ChunkedGrid(store.open(Path(mesh)), (False, False) if wrap is None else wrap)
+    entry = library(mesh)
+    if isinstance(mesh, np.memmap) or (entry and entry.is_array is not None and entry.is_array(mesh)):
+        _refuse(quads, None, "grid")
+        return ChunkedGrid(mesh, (False, False) if wrap is None else wrap)
     return opened(mesh, quads, wrap)
 
 

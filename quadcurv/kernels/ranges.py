@@ -5,13 +5,16 @@ concurrent callers (workqueue). A kernel gives bitwise the same for any cut into
 """
 
 import os
+import threading
 from collections import deque
+from contextlib import contextmanager
 from itertools import pairwise
 
 SERIAL_BELOW = 200_000  # vertices; less work does not pay for waking a thread
 MOST = 1024  # threads
 _pool = None
 _threads = None
+_own = threading.local()
 
 
 def _available():
@@ -23,7 +26,9 @@ def _available():
 
 
 def threads():
-    """Number of threads in use: `set_threads`, QUADCURV_NUM_THREADS, or the cores of this process."""
+    """How many are in use: `serial`, `set_threads`, QUADCURV_NUM_THREADS, or the cores of this process."""
+    if getattr(_own, "alone", False):
+        return 1
     if _threads is not None:
         return _threads
     try:
@@ -58,6 +63,17 @@ def set_threads(number: int | None) -> None:
     if number is not None and not 1 <= number <= MOST:
         raise ValueError(f"number: expected at least 1 thread and at most {MOST}, got {number}")
     _threads = number
+
+
+@contextmanager
+def serial():
+    """What the calling thread computes within, it computes alone: others compute beside it already."""
+    before = getattr(_own, "alone", False)
+    _own.alone = True
+    try:
+        yield
+    finally:
+        _own.alone = before
 
 
 def _forget_pool():

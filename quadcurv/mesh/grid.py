@@ -84,7 +84,7 @@ class QuadGrid:
                     + (" where the grid wraps" if wraps[axis] else "")
                 )
             if wraps[axis]:
-                _refuse_repetition(checked, axis, name)
+                refuse_repetition(checked, axis, name)
         self.__dict__["report"] = Report(unexpected)
         warn_of(unexpected)
 
@@ -159,7 +159,7 @@ class QuadGrid:
         return mesh.with_roundoff(self.roundoff)
 
 
-def _refuse_repetition(points: Floats, axis: int, name: str) -> None:
+def refuse_repetition(points: Floats, axis: int, name: str) -> None:
     """The first row of a wrap that the last one repeats would make quads without area."""
     with np.errstate(invalid="ignore"):
         first, last, second = (on_host(points.take(k, axis)) for k in (0, -1, 1))

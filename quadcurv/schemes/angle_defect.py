@@ -42,3 +42,12 @@ def angle_defect(stencils: Stencils) -> tuple[Floats, Floats]:
     np.add.at(turn, triangles, angle)
     np.add.at(area, triangles, sine / 6)
     return 2 * np.pi - turn[: stencils.n], area[: stencils.n]
+
+
+def gaussian_curvature(stencils: Stencils) -> Floats:
+    """(n,) the angle defect over the area, NaN in open rings."""
+    defect, area = angle_defect(stencils)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        K = defect / area
+    K[~stencils.closed | ~np.isfinite(K)] = np.nan
+    return K

@@ -271,6 +271,8 @@ class Fit:
         Neighbourhoods -> Curvatures at all n vertices, arrays (n,) and (n, 3). A driver gives them the mesh's
         shape, puts NaN at vertices that want none, and takes the side with H >= 0 where no side is the
         outer one.
+    reach : int or None
+        Rings of faces that a result rests on at most; None where all of the mesh decides.
 
     Examples
     --------
@@ -283,6 +285,7 @@ class Fit:
     order: int
     reference: str
     fit: Callable[[Neighbourhoods], Curvatures]
+    reach: int | None = None
 
 
 Scheme = Laplacian | Fit

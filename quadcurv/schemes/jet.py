@@ -100,6 +100,7 @@ def jet(degree: int | Literal["auto"] | None = None, rings: int | None = None) -
         2 if degree < 4 else degree,
         _REFERENCE,
         lambda around: _curvatures(around, degree, rings),
+        int(rings) + _GROWTH + 1,  # and the normals of these
     )
 
 
