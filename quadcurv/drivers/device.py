@@ -154,7 +154,8 @@ def _evaluate_grid(grid: QuadGrid, scheme: Laplacian, boundary: str, results: Ma
         found = _on_host(strip.points, strip_wrap, scheme, boundary, results)
         at = (*along, kept)
         copy = partial(_copy, results, at, {name: values[at] for name, values in found.items()})
-        if (axis, end) in poles(strip):
+        pole = poles(strip)
+        if pole is not None and np.moveaxis(pole, axis, 0)[end].max() >= 0:
             poles_copied.append(copy)
         else:
             copy()

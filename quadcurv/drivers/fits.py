@@ -288,7 +288,7 @@ class _FaceNeighbourhoods:
         from quadcurv.kernels import jet
 
         s, (indptr, corners) = self.stencils, self.corners
-        normals = self._averaged if kind == _ROUND else self.normals
+        normals = self._averaged if kind == jet.ROUND else self.normals
 
         def fits(vertices: Ints, out: Floats) -> None:
             jet.face_fits(
