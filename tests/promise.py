@@ -439,7 +439,7 @@ def verdict(seed: int) -> tuple[str, str]:
 
 def main(count: int, start: int = 0) -> None:
     """Print how many cases ended how, and those that must not be."""
-    ends, bad = Counter(), []
+    ends = Counter()
     for seed in range(start, start + count):
         try:
             end, what = verdict(seed)
@@ -447,8 +447,9 @@ def main(count: int, start: int = 0) -> None:
             end, what = "crashed", f"{seed}: {type(error).__name__}: {error}"
         ends[end] += 1
         if end in ("wrong", "changed", "crashed"):
-            bad.append(what)
-    print(*bad, sep="\n")
+            print(what, flush=True)
+        if (seed + 1 - start) % 1000 == 0:
+            print(seed + 1 - start, dict(ends), flush=True)
     print(dict(ends))
 
 

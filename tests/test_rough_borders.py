@@ -319,3 +319,41 @@ def test_roughness_tells_smooth_from_rough():
     assert np.isnan(roughness(qc.QuadGrid(smooth.points[:4]))[0, 5])
     cells = surfaces.tanh_sheet().sample((12, 12), "staggered")[0]
     assert (roughness(cells) == 0).all()
+
+
+# ---- noise in fits ----------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("amount", [1e-4, 1e-3, 1e-2])
+def test_borders_magnify_noise_no_more_than_the_inside(amount):
+    """Ghosts of ghosts at corners would by thousands, one-sided windows beside the border by ten."""
+    off = []
+    for seed in range(8):
+        grid, exact = damaged("tanh_sheet", 20, "noise", amount, seed)
+        off.append(qc.mean_curvature(grid, "jet") - exact)
+    error = np.sqrt(np.mean(np.square(off), axis=0))
+    inside = error[3:-3, 3:-3].max()
+    assert error[1, 2:-2].max() < 3 * inside
+    assert max(error[0, 2:-2].max(), error[2:-2, -1].max()) < 8 * inside
+    assert error[[0, 0, -1, -1], [0, -1, 0, -1]].max() < 10 * inside
+
+
+@pytest.mark.parametrize("scheme", ["jet", "jet-2", "jet-auto"])
+@pytest.mark.parametrize("rows", [5, 6, 7])
+def test_fits_on_narrow_grids_have_values(scheme, rows):
+    points = surfaces.torus().sample((14, 14))[0].points[:rows]
+    assert np.isfinite(qc.mean_curvature(qc.QuadGrid(points, (False, True)), scheme)).all()
+
+
+def test_dead_ends_of_few_points_are_nan_or_near():
+    """Between two holes two cells wide: what no surface tells is not told."""
+    surface = surfaces.tanh_sheet()
+    t = np.linspace(*surface.domain[0], 21)
+    u, v = np.meshgrid(t, t, indexing="ij")
+    hidden = np.zeros((21, 21), bool)
+    hidden[:4, 12:15] = hidden[2:4, 18:] = True
+    grid = qc.QuadGrid(surface.mapping(u, v), mask=hidden)
+    k1, k2 = surface.principal_curvatures(u, v)
+    for scheme in CONVERGENT:
+        error = np.abs(qc.mean_curvature(grid, scheme) - surface.mean_curvature(u, v))
+        assert np.nanmax(error) < 0.6 * max(np.abs(k1).max(), np.abs(k2).max())

@@ -142,7 +142,8 @@ def doubtful_corners(blocks: Floats, layers: int, turn: Floats) -> tuple[Floats,
     order = blocks.shape[2] - 1
     last = _DIFFERENCES[order - 1]
     off = np.einsum("i,j,ksijx->ksx", last, last, blocks - blocks[:, :, :1, :1])
-    noise = np.linalg.norm(off, axis=2).max(axis=1) / (last @ last)
+    # Short lines tell nothing.
+    noise = np.nan_to_num(np.linalg.norm(off, axis=2)).max(axis=1) / (last @ last)
     error = noise * np.square(index_weights(order, layers)).sum() / 2
     edge = np.linalg.norm(blocks[:, 0, 0, 1] - blocks[:, 0, 0, 0], axis=1)
     return error, ~(error < _DOUBT * turn * edge)

@@ -22,6 +22,7 @@ _CHUNK = 1024  # fits at a time
 _CONDITION = 1e5
 _SPREAD = 1.3  # radius at which weights vanish, of the neighbourhood's
 _THIN = 1e-8  # of a neighbourhood's spread: no more than a line
+_DETERMINED = 0.5  # error of points about the mirror images, in edges, from which on there is no surface
 _STEEP = 0.45  # cosine between normals; where it is less, polynomials of several rings do not follow
 _TERMS = [(a, d - a) for d in range(1, RINGS + 1) for a in range(d, -1, -1)]
 
@@ -99,9 +100,16 @@ def fitted(stencils: Stencils, vertices: Indices) -> Surfaces:
     shared = np.where(known, square, 0.0).sum(axis=1) / np.maximum(known.sum(axis=1), 1)
     noise = np.where(np.isfinite(noise), np.sqrt(shared), np.inf)
     error = np.where(np.isfinite(noise), noise * gain, np.inf)
+    error = np.where(error < _DETERMINED * _distance(stencils, around, ring)[:, None], error, np.inf)
     best = np.arange(k), np.argmin(error, axis=1)
     chosen = [values[best] for values in (maps, coefficients, error, noise, bend)]
     return Surfaces._make((stencils.points[vertices], frames, *chosen, around, ring))
+
+
+def _distance(stencils: Stencils, around: Ints, ring: Ints) -> Floats:
+    """Mean distance (k,) of the first ring."""
+    away = np.linalg.norm(stencils.points[around] - stencils.points[around[:, :1]], axis=2)
+    return np.asarray(away.sum(axis=1, where=ring == 1) / np.maximum((ring == 1).sum(axis=1), 1))
 
 
 def _normals(stencils: Stencils, vertices: Indices, around: Ints, ring: Ints) -> Floats:
