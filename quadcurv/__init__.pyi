@@ -26,6 +26,7 @@ from .io import to_trimesh as to_trimesh
 from .io import write as write
 from .kernels.ranges import set_threads as set_threads
 from .mesh import ChunkedGrid as ChunkedGrid
+from .mesh import FaceParts as FaceParts
 from .mesh import GridBlocks as GridBlocks
 from .mesh import QuadGrid as QuadGrid
 from .mesh import QuadMesh as QuadMesh

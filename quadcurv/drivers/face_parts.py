@@ -1,0 +1,175 @@
+"""Face lists in parts: what a part gives, one after the other or by the workers of a dask client."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import fields
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from quadcurv import drivers
+from quadcurv.boundary import REACH, checked_boundary
+from quadcurv.drivers import direct
+from quadcurv.mesh.face_parts import FaceParts
+from quadcurv.schemes import Fit, Laplacian, Scheme
+from quadcurv.types import Floats, Indices, MeshError, MeshWarning
+
+# Rings of faces around vertices whose rings are not regular, or that are fitted. Closing a ring looks REACH
+# faces far, at fits to the residuals of others two rings away, which look as far; and all must know which
+# rings are closed where they end.
+_RINGS = 3 * REACH + 1
+_OF_FITS: dict[str, tuple[int, ...]] = {
+    "mean_curvature": (),
+    "mean_curvature_normal": (3,),
+    "gaussian_curvature": (),
+    "k1": (),
+    "k2": (),
+    "direction1": (3,),
+    "direction2": (3,),
+    "normal": (3,),
+}
+
+
+def evaluate(
+    mesh: FaceParts,
+    wanted: Iterable[str],
+    scheme: Scheme,
+    boundary: str = "extrapolate",
+    out: Mapping[str, Any] | None = None,
+) -> dict[str, Any]:
+    """Results by name, into arrays of `out` where there are any; see `FaceParts`."""
+    checked_boundary(boundary)
+    if isinstance(scheme, Fit) and scheme.name == "jet-auto":
+        raise ValueError("scheme: jet-auto chooses for a mesh as a whole, which parts do not see")
+    results = _arrays(mesh, wanted, scheme, {} if out is None else out)
+    said: list[str] = []
+    # Flaps of triangles are computed relative to the first irregular vertex.
+    seen_from = mesh.first_irregular() if mesh.has_triangles and _is_fast(scheme) else None
+    job = _Job(tuple(results), scheme, boundary, seen_from)
+    for vertices, found, warned in _answers(mesh, job):
+        at = _slice(vertices)
+        for name, values in found.items():
+            results[name][at] = values
+        if warned:
+            said.append(warned)
+    if said:
+        warnings.warn(
+            f"{len(said)} part(s) of the mesh have what is mended, one of them: {said[0]}",
+            MeshWarning,
+            stacklevel=3,
+        )
+    return results
+
+
+class _Job(NamedTuple):
+    """What is asked of every part."""
+
+    wanted: tuple[str, ...]
+    scheme: Scheme
+    boundary: str
+    origin: int | None
+
+
+def _is_fast(scheme: Scheme) -> bool:
+    return isinstance(scheme, Laplacian) and scheme.fast is not None
+
+
+Answer = tuple[Indices, dict[str, Floats], str]
+
+
+def _answers(mesh: FaceParts, job: _Job) -> Iterator[Answer]:
+    """What each part gives, in any order."""
+    if mesh.client is None:
+        for p in range(mesh.parts):
+            yield part_results(mesh, p, job)
+        return
+    from distributed import as_completed
+
+    # A task reads files and gives arrays, no more: done again by another worker it gives the same.
+    options: dict[str, Any] = {"pure": False, "retries": 3}
+    waiting = iter(range(mesh.parts))
+    at_once = 2 * max(1, sum(mesh.client.nthreads().values()))
+
+    def submitted(p: int) -> Any:
+        return mesh.client.submit(part_results, mesh, p, job, alone=True, **options)
+
+    running = as_completed([submitted(p) for _, p in zip(range(at_once), waiting, strict=False)])
+    for future in running:
+        answer = future.result()
+        future.release()
+        yield answer
+        following = next(waiting, None)
+        if following is not None:
+            running.add(submitted(following))
+
+
+def part_results(mesh: FaceParts, p: int, job: _Job, alone: bool = False) -> Answer:
+    """Numbers of the vertices of a part, their results by name, and what there is to warn of."""
+    from quadcurv.kernels import ranges
+
+    if alone:  # workers compute beside each other already
+        with ranges.serial():
+            return part_results(mesh, p, job)
+    wanted, scheme, boundary, origin = job
+    is_fit = isinstance(scheme, Fit)
+    try:
+        part = mesh.part(p, _RINGS, is_fit, origin)
+    except MeshError as error:
+        raise MeshError(f"part {p}, vertices {mesh.cuts[p]}..{mesh.cuts[p + 1] - 1}: {error}") from None
+    owned = mesh.owned(p)
+    results = {
+        name: np.full((owned.size, *(_OF_FITS if is_fit else direct.PER_VERTEX)[name]), np.nan)
+        for name in wanted
+    }
+    if part is None:
+        if "dual_areas" in results:
+            results["dual_areas"][:] = 0
+        return owned, results, ""
+    if isinstance(scheme, Laplacian):
+        found = drivers.run(part.mesh, scheme, wanted, boundary)
+        if "dual_areas" in results:
+            results["dual_areas"][:] = 0  # of isolated vertices, which no face has told of
+    else:
+        found = _named(drivers.fit(part.mesh, scheme, boundary), wanted)
+    place = np.searchsorted(owned, part.vertices) if not mesh.renumbered else _places(owned, part.vertices)
+    for name, values in found.items():
+        results[name][place] = values[part.own]
+    return owned, results, part.said
+
+
+def _named(found: Any, wanted: tuple[str, ...]) -> dict[str, Floats]:
+    """Results of a fit by their names among those of the verbs."""
+    values = {f.name: getattr(found, f.name) for f in fields(found)}
+    values["mean_curvature"], values["gaussian_curvature"] = values["mean"], values["gaussian"]
+    if "mean_curvature_normal" in wanted:
+        values["mean_curvature_normal"] = -found.mean[:, None] * found.normal
+    return {name: values[name] for name in wanted}
+
+
+def _places(owned: Indices, vertices: Indices) -> Indices:
+    order = np.argsort(owned)
+    return order[np.searchsorted(owned[order], vertices)]
+
+
+def _slice(vertices: Indices) -> Any:
+    """Vertices that follow each other as a slice, which arrays on disk take too."""
+    if vertices.size and vertices[-1] - vertices[0] + 1 == vertices.size and (np.diff(vertices) == 1).all():
+        return slice(int(vertices[0]), int(vertices[-1]) + 1)
+    return vertices
+
+
+def _arrays(mesh: FaceParts, wanted: Iterable[str], scheme: Scheme, out: Mapping[str, Any]) -> dict[str, Any]:
+    """The caller's arrays, anything that takes slices, or new ones in memory."""
+    known = _OF_FITS if isinstance(scheme, Fit) else direct.PER_VERTEX
+    results: dict[str, Any] = {}
+    for name in dict.fromkeys((*wanted, *out)):
+        if name not in known:
+            raise ValueError(f"wanted: expected some of {', '.join(known)}, got {name!r}")
+        full = mesh.shape + known[name]
+        array = out[name] if name in out else np.empty(full)
+        if tuple(array.shape) != full or array.dtype != np.float64:
+            raise ValueError(f"out: {name} wants float64 of shape {full}, got {array.dtype} of {array.shape}")
+        results[name] = array
+    return results

@@ -1,0 +1,290 @@
+"""Face lists in parts: bitwise those of one mesh, whatever the order, wherever the cuts are."""
+
+from __future__ import annotations
+
+import warnings
+
+import numpy as np
+import pytest
+
+import quadcurv as qc
+from quadcurv.kernels import parts as kernels
+from quadcurv.mesh import face_parts
+from quadcurv.surfaces import cubed_ellipsoid, torus
+
+WANTED = ("mean_curvature", "mean_curvature_normal", "vertex_normals", "dual_areas")
+
+
+@pytest.fixture(autouse=True)
+def small_chunks(monkeypatch):
+    """Files are read in many pieces."""
+    monkeypatch.setattr(face_parts, "CHUNK", 37)
+
+
+def noisy(points, size=0.01):
+    return points + np.random.default_rng(5).normal(0, size, points.shape)
+
+
+def closed() -> tuple[np.ndarray, np.ndarray]:
+    mesh = cubed_ellipsoid().sample((8, 8), "faces")[0]
+    return noisy(mesh.points), mesh.faces
+
+
+def sheet(n=26, m=17) -> tuple[np.ndarray, np.ndarray]:
+    """An open sheet, uneven and rough in places."""
+    x, y = np.meshgrid(np.linspace(0, 1, n) ** 1.5, np.linspace(0, 1, m), indexing="ij")
+    points = np.stack([x, y, np.sin(2 * x) * np.cos(3 * y)], axis=-1)
+    points[:6] = noisy(points[:6], 0.004)
+    mesh = qc.QuadGrid(points).to_mesh()
+    return mesh.points, mesh.faces
+
+
+def with_triangles(points, faces) -> tuple[np.ndarray, np.ndarray]:
+    cut = np.random.default_rng(1).random(len(faces)) < 0.3
+    halves = np.concatenate((faces[cut][:, [0, 1, 2]], faces[cut][:, [2, 3, 0]]))
+    halves = np.insert(halves, 3, -1, axis=1)
+    return points, np.concatenate((faces[~cut], halves))
+
+
+def triangles(points, faces) -> tuple[np.ndarray, np.ndarray]:
+    return points, np.concatenate((faces[:, [0, 1, 2]], faces[:, [2, 3, 0]]))
+
+
+def shuffled(points, faces) -> tuple[np.ndarray, np.ndarray]:
+    order = np.random.default_rng(2).permutation(len(points))
+    number = np.append(np.argsort(order), -1)
+    faces = number[faces]
+    return points[order], faces[np.random.default_rng(3).permutation(len(faces))]
+
+
+MESHES = {
+    "closed": closed(),
+    "shuffled": shuffled(*closed()),
+    "sheet": sheet(),
+    "shuffled sheet": shuffled(*sheet()),
+    "mixed": with_triangles(*sheet()),
+    "shuffled mixed": shuffled(*with_triangles(*closed())),
+    "triangles": triangles(*closed()),
+    "shuffled triangles": shuffled(*triangles(*sheet())),
+}
+
+
+def check(one, other, at=slice(None)):
+    for name, values in other.items():
+        np.testing.assert_array_equal(np.asarray(values)[at], one[name][at], err_msg=name)
+
+
+@pytest.mark.parametrize("number", [1, 2, 7])
+@pytest.mark.parametrize("mesh", MESHES)
+def test_parts_are_bitwise_one_mesh(mesh, number, tmp_path):
+    points, faces = MESHES[mesh]
+    parts = qc.FaceParts(points, faces, tmp_path / "parts", parts=number)
+    assert number == 1 or parts.renumbered or not mesh.startswith("shuffled")
+    whole = qc.QuadMesh(points, faces)
+    for boundary in ("extrapolate", "nan"):
+        for scheme in ("finite_volume", "liu"):
+            one = qc.evaluate(whole, *WANTED, scheme=scheme, boundary=boundary)
+            check(one, qc.evaluate(parts, *WANTED, scheme=scheme, boundary=boundary))
+        for scheme in ("bilinear", "cotan-6"):  # sparse matrices sum their rows in any order
+            one = qc.evaluate(whole, *WANTED, scheme=scheme, boundary=boundary)
+            for name, values in qc.evaluate(parts, *WANTED, scheme=scheme, boundary=boundary).items():
+                np.testing.assert_allclose(values, one[name], rtol=1e-11, atol=1e-12, err_msg=name)
+
+
+@pytest.mark.parametrize("mesh", ["closed", "shuffled", "sheet", "shuffled mixed"])
+def test_fits_are_bitwise_one_mesh(mesh, tmp_path):
+    points, faces = MESHES[mesh]
+    parts = qc.FaceParts(points, faces, tmp_path / "parts", parts=5)
+    for scheme in ("jet", "jet-2"):
+        for boundary in ("extrapolate", "nan"):
+            found = qc.curvatures(qc.QuadMesh(points, faces), scheme, boundary)
+            one = {name: getattr(found, name) for name in ("k1", "k2", "direction1", "direction2", "normal")}
+            one |= {"mean_curvature": found.mean, "gaussian_curvature": found.gaussian}
+            check(one, qc.evaluate(parts, *one, scheme=scheme, boundary=boundary))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("number", [2, 16])
+def test_large_parts_are_bitwise_one_mesh(number, tmp_path, monkeypatch):
+    monkeypatch.setattr(face_parts, "CHUNK", 1 << 16)
+    grid = torus().sample((512, 300))[0]
+    mesh = qc.QuadMesh(noisy(grid.points.reshape(-1, 3), 1e-3), grid.to_mesh().faces[:-7000])
+    points, faces = shuffled(mesh.points, mesh.faces)
+    parts = qc.FaceParts(points, faces, tmp_path / "parts", parts=number)
+    check(qc.evaluate(qc.QuadMesh(points, faces), *WANTED), qc.evaluate(parts, *WANTED))
+
+
+def test_results_go_into_files(tmp_path):
+    points, faces = MESHES["shuffled"]
+    parts = qc.FaceParts(points, faces, tmp_path / "parts", parts=4)
+    out = np.lib.format.open_memmap(tmp_path / "H.npy", "w+", np.float64, (len(points),))
+    found = qc.evaluate(parts, scheme="liu", out={"mean_curvature": out})
+    assert found["mean_curvature"] is out
+    out.flush()
+    np.testing.assert_array_equal(
+        np.load(tmp_path / "H.npy"),
+        qc.evaluate(qc.QuadMesh(points, faces), *found, scheme="liu")["mean_curvature"],
+    )
+
+
+@pytest.mark.parametrize("dtype", [np.float64, np.float32])
+@pytest.mark.parametrize("mesh", ["closed", "shuffled"])
+def test_files_are_read_where_they_are(mesh, dtype, tmp_path):
+    h5py = pytest.importorskip("h5py")
+    points, faces = MESHES[mesh]
+    points = points.astype(dtype)
+    expected = qc.evaluate(qc.QuadMesh(points, faces), *WANTED)
+    np.save(tmp_path / "x.npy", points)
+    np.save(tmp_path / "f.npy", faces.astype(np.int64))
+    mapped = np.load(tmp_path / "x.npy", mmap_mode="r"), np.load(tmp_path / "f.npy", mmap_mode="r")
+    parts = qc.FaceParts(*mapped, tmp_path / "a", parts=3)
+    assert (tmp_path / "a" / "points.npy").exists() == parts.renumbered
+    check(expected, qc.evaluate(parts, *WANTED))
+    with h5py.File(tmp_path / "m.h5", "w") as file:
+        file["Points"], file["Faces"] = points, faces
+        parts = qc.FaceParts(file["Points"], file["Faces"], tmp_path / "b", parts=3)
+    check(expected, qc.evaluate(parts, *WANTED))
+    # A part of a mapped array is not what the file holds.
+    cut = qc.FaceParts(mapped[0][: -0 or None][::1], mapped[1], tmp_path / "c", parts=3)
+    check(expected, qc.evaluate(cut, *WANTED))
+
+
+def test_isolated_vertices_and_parts_without_faces(tmp_path):
+    points, faces = MESHES["closed"]
+    points = np.concatenate((points, np.full((200, 3), 9.0)))
+    parts = qc.FaceParts(points, faces, tmp_path / "parts", parts=6)
+    expected = qc.evaluate(qc.QuadMesh(points, faces), *WANTED)
+    check(expected, qc.evaluate(parts, *WANTED))
+    assert np.isnan(expected["mean_curvature"][-200:]).all()
+
+
+def test_what_is_mended_is_told_of(tmp_path):
+    points, faces = MESHES["sheet"]
+    faces = np.concatenate((faces, faces[3:4]))
+    with pytest.warns(qc.MeshWarning, match="given twice"):
+        expected = qc.evaluate(qc.QuadMesh(points, faces), *WANTED)
+    parts = qc.FaceParts(points, faces, tmp_path / "parts", parts=3)
+    with pytest.warns(qc.MeshWarning, match=r"part\(s\) of the mesh have what is mended, .* given twice"):
+        found = qc.evaluate(parts, *WANTED)
+    check(expected, found)
+
+
+def test_what_is_refused(tmp_path):
+    points, faces = MESHES["closed"]
+
+    def made(points=points, faces=faces, folder="x", **options):
+        return qc.FaceParts(points, faces, tmp_path / folder, **options)
+
+    with pytest.raises(qc.MeshError, match=r"points: shape \(4,\)"):
+        made(points=np.zeros(4))
+    with pytest.raises(qc.MeshError, match="points: expected an array with slices, got list"):
+        made(points=points.tolist())
+    with pytest.raises(qc.MeshError, match="faces: expected numbers of kind 'iu', got dtype float64"):
+        made(faces=faces.astype(float))
+    with pytest.raises(qc.MeshError, match="parts: expected a whole number from 1 to"):
+        made(parts=0)
+    wrong = faces.copy()
+    wrong[71, 2] = len(points)
+    with pytest.raises(qc.MeshError, match=r"1 face\(s\) with an index outside .* first face 71"):
+        made(faces=wrong, folder="a", parts=2)
+    lost = points.copy()
+    lost[60, 1] = np.inf
+    with pytest.raises(qc.MeshError, match=r"1 non-finite point.* first vertex 60"):
+        made(points=lost, folder="b", parts=2)
+    (tmp_path / "c").mkdir()
+    (tmp_path / "c" / "file").touch()
+    with pytest.raises(qc.MeshError, match="is not empty"):
+        made(folder="c")
+    turned = faces.copy()
+    turned[100] = turned[100, ::-1]
+    parts = made(faces=turned, folder="d", parts=4)
+    with pytest.raises(qc.MeshError, match=r"part \d, vertices .*: faces: some run against their neighbours"):
+        qc.evaluate(parts, "mean_curvature")
+    parts = made(folder="e", parts=4)
+    with pytest.raises(ValueError, match="jet-auto chooses for a mesh as a whole"):
+        qc.evaluate(parts, "k1", scheme="jet-auto")
+    with pytest.raises(ValueError, match="wanted: expected some of"):
+        qc.evaluate(parts, "k1", scheme="liu")
+    with pytest.raises(ValueError, match="out: mean_curvature wants float64 of shape"):
+        qc.evaluate(parts, out={"mean_curvature": np.zeros(3)})
+    with pytest.raises(ValueError, match="boundary: expected one of"):
+        qc.evaluate(parts, "mean_curvature", boundary="none")
+    assert repr(parts) == f"FaceParts({len(points)} points in 4 parts)"
+
+
+def test_faces_go_to_the_parts_that_own_their_vertices():
+    faces = np.array([[0, 1, 2, 3], [3, 2, 4, -1], [4, 5, 6, 7]], np.int32)
+    out, begin = kernels.by_part(faces, 10, np.array([0, 3, 5, 8]), np.empty(0, np.int32))
+    assert begin.tolist() == [0, 2, 5, 6]
+    assert out[:, 0].tolist() == [10, 11, 10, 11, 12, 12]
+    assert out[1, 1:].tolist() == [3, 2, 4, -1]
+    reverse = np.arange(8, dtype=np.int32)[::-1].copy()
+    out, begin = kernels.by_part(faces, 0, np.array([0, 4, 8]), reverse)
+    assert out[: begin[1], 0].tolist() == [1, 2]
+    assert out[0, 1:].tolist() == [4, 5, 3, -1]
+
+
+def test_the_curve_keeps_neighbours_together():
+    n = 16
+    x = np.stack(np.meshgrid(*[np.arange(n) / (n - 1)] * 3, indexing="ij"), axis=-1).reshape(-1, 3)
+    key = kernels.curve(x, np.zeros(3), 1.0)
+    assert np.unique(key).size == n**3
+    order = np.argsort(key)
+    # Each eighth is one octant.
+    for octant in np.split(x[order], 8):
+        assert np.ptp(octant, axis=0).max() < 0.5
+
+
+# dask
+
+
+@pytest.fixture
+def client():
+    distributed = pytest.importorskip("distributed")
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        with (
+            distributed.LocalCluster(
+                n_workers=2, threads_per_worker=1, dashboard_address=None, processes=True
+            ) as cluster,
+            distributed.Client(cluster) as client,
+        ):
+            yield client
+
+
+@pytest.mark.slow
+@pytest.mark.filterwarnings("ignore")
+def test_workers_compute_the_same(client, tmp_path):
+    for mesh in ("shuffled", "sheet"):
+        points, faces = MESHES[mesh]
+        parts = qc.FaceParts(points, faces, tmp_path / mesh, parts=6, client=client)
+        check(qc.evaluate(qc.QuadMesh(points, faces), *WANTED), qc.evaluate(parts, *WANTED))
+    found = qc.curvatures(qc.QuadMesh(points, faces))
+    np.testing.assert_array_equal(qc.evaluate(parts, "k1", scheme="jet")["k1"], found.k1)
+
+
+@pytest.mark.slow
+@pytest.mark.filterwarnings("ignore")
+def test_a_worker_killed_in_the_middle_changes_nothing(client, tmp_path):
+    import os
+    import signal
+    import threading
+
+    points, faces = MESHES["shuffled"]
+    parts = qc.FaceParts(points, faces, tmp_path / "parts", parts=150, client=client)
+    first = next(iter(client.run(os.getpid).values()))
+    done = []
+
+    def kill():
+        os.kill(first, signal.SIGKILL)
+        done.append(first)
+
+    timer = threading.Timer(1.0, kill)
+    timer.start()
+    for _ in range(20):
+        found = qc.evaluate(parts, *WANTED)
+        if done:
+            break
+    timer.join()
+    assert done
+    check(qc.evaluate(qc.QuadMesh(points, faces), *WANTED), found)
