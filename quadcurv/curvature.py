@@ -11,15 +11,9 @@ from numpy.typing import ArrayLike
 
 from quadcurv import drivers
 from quadcurv.boundary import one_rings
-<<<<<<< HEAD
-from quadcurv.drivers import parts
+from quadcurv.drivers import face_parts, parts
 from quadcurv.io import as_mesh, as_mesh_or_chunks
-from quadcurv.mesh import ChunkedGrid, GridBlocks, Mesh, StaggeredGrid
-=======
-from quadcurv.drivers import face_parts
-from quadcurv.io import as_mesh
-from quadcurv.mesh import FaceParts, GridBlocks, Mesh, StaggeredGrid
->>>>>>> ae2e4c3 (Compute face lists larger than memory in parts)
+from quadcurv.mesh import ChunkedGrid, FaceParts, GridBlocks, Mesh, StaggeredGrid
 from quadcurv.precision import warn_of_rounding
 from quadcurv.schemes import Curvatures, Fit, Laplacian, Scheme, SchemeName, as_scheme
 from quadcurv.schemes.angle_defect import gaussian_curvature as angle_gaussian_curvature
@@ -177,6 +171,8 @@ def mean_curvature(
     True
     """
     chosen = as_scheme(scheme)
+    if isinstance(mesh, FaceParts):
+        return face_parts.evaluate(mesh, ["mean_curvature"], chosen, boundary)["mean_curvature"]
     mesh = parts.in_parts(_taken(mesh), chosen)
     if isinstance(mesh, ChunkedGrid):
         return parts.verb(mesh, "mean_curvature", chosen, boundary)
@@ -217,6 +213,8 @@ def mean_curvature_normal(
     True
     """
     chosen = as_scheme(scheme)
+    if isinstance(mesh, FaceParts):
+        return face_parts.evaluate(mesh, ["mean_curvature_normal"], chosen, boundary)["mean_curvature_normal"]
     mesh = parts.in_parts(_taken(mesh), chosen)
     if isinstance(mesh, ChunkedGrid):
         return parts.verb(mesh, "mean_curvature_normal", chosen, boundary)
@@ -261,6 +259,10 @@ def gaussian_curvature(
     """
     angles = isinstance(scheme, str) and scheme == "angle_defect"
     chosen = scheme if angles else _as_fit(scheme)
+    if isinstance(mesh, FaceParts):
+        return face_parts.evaluate(mesh, ["gaussian_curvature"], _as_fit(scheme), boundary)[
+            "gaussian_curvature"
+        ]
     mesh = parts.in_parts(_taken(mesh), chosen)
     if isinstance(mesh, ChunkedGrid):
         return parts.verb(mesh, "gaussian_curvature", chosen, boundary)
@@ -505,17 +507,13 @@ def evaluate(
     >>> sorted(qc.evaluate(ball, "mean_curvature", "dual_areas"))
     ['dual_areas', 'mean_curvature']
     """
-<<<<<<< HEAD
-    mesh, chosen = _taken(mesh), as_scheme(scheme)
+    chosen = as_scheme(scheme)
+    if isinstance(mesh, FaceParts):
+        return face_parts.evaluate(mesh, wanted, chosen, boundary, out)
+    mesh = _taken(mesh)
     if isinstance(mesh, ChunkedGrid):
         return parts.evaluate(mesh, wanted, chosen, boundary, out, progress)
     found = drivers.run(mesh, _as_laplacian(chosen), wanted, boundary, out)
-=======
-    if isinstance(mesh, FaceParts):
-        return face_parts.evaluate(mesh, wanted, as_scheme(scheme), boundary, out)
-    mesh = _taken(mesh)
-    found = drivers.run(mesh, _as_laplacian(scheme), wanted, boundary, out)
->>>>>>> ae2e4c3 (Compute face lists larger than memory in parts)
     return {name: _split(mesh, values) for name, values in found.items()}
 
 

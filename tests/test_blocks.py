@@ -253,7 +253,11 @@ def test_a_pole_is_one_vertex():
 # Cells
 
 
-@pytest.mark.parametrize("scheme", ["finite_volume", "liu", "bilinear", "jet"])
+@pytest.mark.parametrize(
+    "scheme",
+    ["finite_volume", "liu", "bilinear", qc.schemes.jet(4)],
+    ids=["finite_volume", "liu", "bilinear", "jet-4"],
+)
 def test_cells_have_their_neighbours_around_them(scheme):
     """Inside, whatever a panel is, and along seams where panels go on smoothly: as one grid has them."""
     surface = torus()
@@ -275,7 +279,7 @@ def test_cells_have_their_neighbours_around_them(scheme):
 
 @pytest.mark.parametrize(
     ("scheme", "n", "order", "mean_order", "bound"),
-    [("finite_volume", 64, 1, 2, 4e-3), ("liu", 64, 1, 2, 2e-3), ("jet", 16, 4, 4, 1.1e-4)],
+    [("finite_volume", 64, 1, 2, 4e-3), ("liu", 64, 1, 2, 2e-3), (qc.schemes.jet(4), 16, 4, 4, 1.1e-4)],
 )
 def test_cells_of_a_cubed_sphere_converge(scheme, n, order, mean_order, bound):
     """Seams are kinks of the grid lines, where second-order schemes are of first order, as on one mesh."""

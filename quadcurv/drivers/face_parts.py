@@ -11,15 +11,16 @@ import numpy as np
 
 from quadcurv import drivers
 from quadcurv.boundary import REACH, checked_boundary
-from quadcurv.drivers import direct
+from quadcurv.drivers import direct, fits
 from quadcurv.mesh.face_parts import FaceParts
 from quadcurv.schemes import Fit, Laplacian, Scheme
 from quadcurv.types import Floats, Indices, MeshError, MeshWarning
 
-# Rings of faces around vertices whose rings are not regular, or that are fitted. Closing a ring looks REACH
-# faces far, at fits to the residuals of others two rings away, which look as far; and all must know which
-# rings are closed where they end.
-_RINGS = 3 * REACH + 1
+# Rings of faces around vertices whose rings are not regular. Closing a ring looks REACH faces far, at fits to
+# the residuals of others two rings away, which look as far; and all must know which rings are closed where
+# they end. A fit of up to five rings looks beyond borders as these do, and chooses by what others find up to
+# six rings away.
+_RINGS, _FIT_RINGS = 3 * REACH + 1, 6 * REACH
 _OF_FITS: dict[str, tuple[int, ...]] = {
     "mean_curvature": (),
     "mean_curvature_normal": (3,),
@@ -115,7 +116,7 @@ def part_results(mesh: FaceParts, p: int, job: _Job, alone: bool = False) -> Ans
     wanted, scheme, boundary, origin = job
     is_fit = isinstance(scheme, Fit)
     try:
-        part = mesh.part(p, _RINGS, is_fit, origin)
+        part = mesh.part(p, _FIT_RINGS if is_fit else _RINGS, is_fit, origin)
     except MeshError as error:
         raise MeshError(f"part {p}, vertices {mesh.cuts[p]}..{mesh.cuts[p + 1] - 1}: {error}") from None
     owned = mesh.owned(p)
@@ -132,7 +133,9 @@ def part_results(mesh: FaceParts, p: int, job: _Job, alone: bool = False) -> Ans
         if "dual_areas" in results:
             results["dual_areas"][:] = 0  # of isolated vertices, which no face has told of
     else:
-        found = _named(drivers.fit(part.mesh, scheme, boundary), wanted)
+        around = fits.MeshNeighbourhoods(part.mesh, boundary)
+        around.rounding = fits.ROUNDING * mesh.largest
+        found = _named(fits.fit_around(around, scheme), wanted)
     place = np.searchsorted(owned, part.vertices) if not mesh.renumbered else _places(owned, part.vertices)
     for name, values in found.items():
         results[name][place] = values[part.own]

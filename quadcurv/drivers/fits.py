@@ -32,7 +32,7 @@ from quadcurv.stencils import Stencils
 from quadcurv.types import Bools, Floats, Indices, Ints
 
 _GHOST_DEGREE, _GHOST_LAYERS = 5, 3
-_ROUNDING = 2.0**-49  # of positions, and of what is computed from them
+ROUNDING = 2.0**-49  # of positions, and of what is computed from them
 _SURE = 0.01
 # Of one fit, in vertices of the finite-volume scheme.
 _WORK = 30
@@ -73,7 +73,7 @@ class MeshNeighbourhoods:
         # Standard error of H and noise by surfaces fitted at the border: points read off these show none.
         self.border_error, self.border_noise = np.full((2, self.stencils.n), np.nan)
         x = self.stencils.points[: self.stencils.n][self.present]
-        self.rounding = _ROUNDING * float(np.abs(x).max(initial=0.0))
+        self.rounding = ROUNDING * float(np.abs(x).max(initial=0.0))
 
     def polynomials(
         self, vertices: Indices, degree: int, rings: int, ghosts: bool = True, kind: int = 0

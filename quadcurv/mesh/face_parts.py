@@ -102,6 +102,7 @@ class FaceParts:
     renumbered: bool
     has_triangles: bool
     roundoff: float
+    largest: float
     client: Any
     _source: tuple[str, int, str, tuple[int, ...]]
 
@@ -126,17 +127,16 @@ class FaceParts:
         if any(place.iterdir()):
             raise MeshError(f"folder: {place} is not empty")
         cuts = np.arange(parts + 1) * n // parts
-        number = np.empty(0, np.int32)
+        number, largest = np.empty(0, np.int32), _largest(points)
         renumbered = parts > 1 and _scattered(faces, cuts)
         if renumbered:
             cuts, number = _renumber(points, parts, place)
             source = _mapped(np.load(place / "points.npy", mmap_mode="r"))
         else:
-            _check_points(points)
             source = _mapped(points) if _is_a_file(points) else _copied(points, place)
         self.__dict__.update(
             folder=place, shape=(n,), cuts=cuts, renumbered=renumbered, client=client,
-            roundoff=unit_roundoff(points), _source=source,
+            roundoff=unit_roundoff(points), largest=largest, _source=source,
         )  # fmt: skip
         self.__dict__["has_triangles"] = _write_parts(faces, n, cuts, number, place)
 
@@ -364,7 +364,15 @@ def _chunks(array: Any) -> Iterator[tuple[int, Any]]:
         yield begin, np.asarray(array[begin : begin + CHUNK])
 
 
-def _check_points(points: Any) -> None:
+def _largest(points: Any) -> float:
+    """Largest size of any coordinate.
+
+    Raises
+    ------
+    MeshError
+        Points that are not finite.
+    """
+    largest = 0.0
     for begin, x in _chunks(points):
         bad = ~np.isfinite(x).all(axis=1)
         if bad.any():
@@ -372,6 +380,8 @@ def _check_points(points: Any) -> None:
                 f"points: {np.count_nonzero(bad)} non-finite point(s) among those from {begin} on, first "
                 f"vertex {begin + int(np.argmax(bad))}"
             )
+        largest = max(largest, float(np.abs(x).max()))
+    return largest
 
 
 def _is_a_file(points: Any) -> bool:
@@ -436,7 +446,6 @@ def _renumber(points: Any, parts: int, place: Path) -> tuple[Indices, Ints]:
     from quadcurv.kernels.parts import curve
 
     n = int(points.shape[0])
-    _check_points(points)
     low, high = np.full(3, np.inf), np.full(3, -np.inf)
     for _, x in _chunks(points):
         low, high = np.minimum(low, x.min(axis=0)), np.maximum(high, x.max(axis=0))

@@ -1,0 +1,215 @@
+"""Face lists larger than memory: in parts, one after the other or by workers, beside one mesh in memory."""
+
+from __future__ import annotations
+
+import os
+import time
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+import quadcurv as qc
+from comparisons.scale import Setting, begin, cost, table
+
+# Vertices a side of a torus; the last one is measured where QUADCURV_LARGE is set.
+SIDES, LARGE = (2048, 4096), 8192
+_WHOLE = 4096  # vertices a side up to which one mesh in memory is measured beside
+_ROWS = 256
+
+
+def section(setting: Setting) -> list[str]:
+    """The lines of the report."""
+    sides = (128,) if setting.quick else SIDES + ((LARGE,) if os.environ.get("QUADCURV_LARGE") else ())
+    header = ["mesh", "way", "CPU s", "ns a vertex", "peak MB"]
+    rows: list[list[object]] = []
+    for n in sides:
+        size = f"{n * n / 1e6:.3g}M"
+        for order in ("natural", "shuffled"):
+            if order == "shuffled" and n > sides[0]:
+                continue
+            folder = str(setting.folder / f"{order}{n}")
+            cost("comparisons.scale_faces:write", folder, n, order)
+            ways: list[tuple[str, str, tuple[Any, ...]]] = []
+            if n <= _WHOLE:
+                ways.append(("one mesh in memory", "in_memory", ()))
+            ways += [
+                ("into parts", "cut", ()),
+                ("part by part", "by_parts", (0,)),
+                *((f"{w} worker(s)", "by_parts", (w,)) for w in (1, 2)),
+            ]
+            for way, job, more in ways:
+                spent = cost(f"comparisons.scale_faces:{job}", folder, *more)
+                rows.append(
+                    [
+                        f"{size}, {order}",
+                        way,
+                        spent.cpu,
+                        spent.cpu / (n * n) * 1e9,
+                        spent.told.get("peak", spent.peak),
+                    ]
+                )
+                told = spent.told.get("same")
+                if told is False:
+                    raise AssertionError(f"{size}, {order}: {way} is not bitwise one mesh")
+    lines = table(header, rows)
+    killed = cost("comparisons.scale_faces:killed", str(setting.folder / f"natural{sides[0]}"))
+    word = "bitwise the same" if killed.told["same"] else "DIFFERENT"
+    lines += ["", f"One of two workers killed after a third of the parts: {word}."]
+    if not setting.quick and LARGE not in sides:
+        lines += ["", f"{LARGE**2 / 1e6:.3g}M vertices: not measured; QUADCURV_LARGE=1 measures them."]
+    return lines
+
+
+def write(folder: str, n: int, order: str) -> None:
+    """A bumpy torus of n x n vertices as .npy files."""
+    place = Path(folder)
+    place.mkdir(parents=True)
+    points = np.lib.format.open_memmap(place / "points.npy", "w+", np.float64, (n * n, 3))
+    faces = np.lib.format.open_memmap(place / "faces.npy", "w+", np.int32, (n * n, 4))
+    number = np.random.default_rng(0).permutation(n * n).astype(np.int32) if order == "shuffled" else None
+    v = 2 * np.pi * np.arange(n) / n
+    along = np.arange(n, dtype=np.int32)
+    for first in range(0, n, _ROWS):
+        rows = np.arange(first, min(first + _ROWS, n))
+        u = 2 * np.pi * rows[:, None] / n
+        a = 1 + 0.1 * np.cos(3 * u) * np.cos(2 * v)
+        x = np.stack(
+            [(3 + a * np.cos(v)) * np.cos(u), (3 + a * np.cos(v)) * np.sin(u), a * np.sin(v)], axis=-1
+        )
+        here, below = rows[:, None] * n, (rows[:, None] + 1) % n * n
+        beside = np.roll(along, -1)
+        quads = np.stack([here + along, below + along, below + beside, here + beside], axis=-1)
+        at = slice(first * n, (first + len(rows)) * n)
+        quads = quads.reshape(-1, 4)
+        faces[at] = quads if number is None else number[quads]
+        points[at if number is None else number[at]] = x.reshape(-1, 3)
+
+
+def _mapped(folder: str) -> tuple[np.ndarray, np.ndarray]:
+    x, f = (np.load(Path(folder) / f"{name}.npy", mmap_mode="r") for name in ("points", "faces"))
+    return x, f
+
+
+def _warm() -> None:
+    """Compile what will be run."""
+    from tempfile import TemporaryDirectory
+
+    mesh, _, _ = qc.surfaces.cubed_sphere().sample((8, 8), "faces")
+    with TemporaryDirectory() as folder:
+        shuffled = np.random.default_rng(0).permutation(len(mesh.points))
+        parts = qc.FaceParts(mesh.points[shuffled], np.argsort(shuffled)[mesh.faces], folder, parts=3)
+        qc.evaluate(parts, "mean_curvature")
+    begin()
+
+
+def in_memory(folder: str) -> None:
+    """Load, make a mesh, compute, and save."""
+    _warm()
+    points, faces = (np.array(x) for x in _mapped(folder))
+    np.save(
+        Path(folder) / "expected.npy",
+        qc.evaluate(qc.QuadMesh(points, faces), "mean_curvature")["mean_curvature"],
+    )
+
+
+def cut(folder: str) -> None:
+    """Write parts of a million vertices."""
+    _warm()
+    points, faces = _mapped(folder)
+    qc.FaceParts(points, faces, Path(folder) / "parts", parts=_parts(points))
+    # Others compute from the same files.
+
+
+def _parts(points: np.ndarray) -> int:
+    return max(4, len(points) >> 20)
+
+
+def _cut_before(folder: str, client: Any = None) -> qc.FaceParts:
+    """Parts that `cut` has written."""
+    import shutil
+
+    points, faces = _mapped(folder)
+    place = Path(folder) / "parts"
+    shutil.rmtree(place, ignore_errors=True)
+    return qc.FaceParts(points, faces, place, parts=_parts(points), client=client)
+
+
+def _same(folder: str, H: np.ndarray) -> bool | None:
+    expected = Path(folder) / "expected.npy"
+    return (
+        bool(np.array_equal(np.load(expected, mmap_mode="r"), H, equal_nan=True))
+        if expected.exists()
+        else None
+    )
+
+
+def by_parts(folder: str, workers: int) -> dict[str, Any]:
+    """Compute parts, here if there are no workers, into a file."""
+    _warm()
+    parts = _cut_before(folder)
+    begin()
+    H = np.lib.format.open_memmap(Path(folder) / "H.npy", "w+", np.float64, parts.shape)
+    told: dict[str, Any] = {}
+    if workers == 0:
+        qc.evaluate(parts, out={"mean_curvature": H})
+    else:
+        with _cluster(workers) as client:
+            qc.evaluate(_with(parts, client), out={"mean_curvature": H})
+            told["peak"] = max(client.run(_peak).values())
+    told["same"] = _same(folder, H)
+    return told
+
+
+def killed(folder: str) -> dict[str, Any]:
+    """One of two workers dies while they compute."""
+    import os as system
+    import signal
+    import threading
+
+    parts = _cut_before(folder)
+    with _cluster(2) as client:
+        H = np.full(parts.shape, np.nan)
+        victim = next(iter(client.run(system.getpid).values()))
+
+        def kill() -> None:
+            while np.isfinite(H).mean() < 1 / 3:
+                time.sleep(0.005)
+            system.kill(victim, signal.SIGKILL)
+
+        thread = threading.Thread(target=kill)
+        thread.start()
+        qc.evaluate(_with(parts, client), out={"mean_curvature": H})
+        thread.join()
+    return {"same": _same(folder, H)}
+
+
+def _with(parts: qc.FaceParts, client: Any) -> qc.FaceParts:
+    parts.__dict__["client"] = client
+    return parts
+
+
+def _cluster(workers: int) -> Any:
+    from contextlib import contextmanager
+
+    from distributed import Client, LocalCluster
+
+    @contextmanager
+    def opened() -> Any:
+        with (
+            LocalCluster(n_workers=workers, threads_per_worker=1, dashboard_address=None) as cluster,
+            Client(cluster) as client,
+        ):
+            yield client
+
+    return opened()
+
+
+def _peak() -> float:
+    """Most memory that the process held, in 10^6 bytes."""
+    import resource
+    import sys
+
+    return (
+        resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * (1 if sys.platform == "darwin" else 1024) / 1e6
+    )
