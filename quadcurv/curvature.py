@@ -44,7 +44,10 @@ class PrincipalCurvatures(NamedTuple):
 
 
 def curvatures(
-    mesh: Any, scheme: SchemeName | str | Fit = DEFAULT, boundary: str = "extrapolate"
+    mesh: Any,
+    scheme: SchemeName | str | Fit = DEFAULT,
+    boundary: str = "extrapolate",
+    radius: float | None = None,
 ) -> Curvatures:
     """All that a fit knows at every vertex: H, K, k1, k2, directions, normal, standard errors.
 
@@ -56,6 +59,8 @@ def curvatures(
         A fit: "jet" and its kin.
     boundary : {"extrapolate", "nan"}
         See :func:`quadcurv.one_rings`.
+    radius : float, optional
+        In length: means at this scale; see Notes.
 
     Returns
     -------
@@ -69,7 +74,16 @@ def curvatures(
     MeshError
         A ValueError: the mesh is not one.
     ValueError
-        Unknown scheme or boundary; a scheme that is no fit.
+        Unknown scheme or boundary; a scheme that is no fit; a radius that is no positive length,
+        or one for a grid in chunks.
+
+    Notes
+    -----
+    With a radius H, K, k1 and k2 are area-weighted means over what lies within that distance (in space) and
+    hangs together with the vertex there, as in Cohen-Steiner and Morvan (2003), and directions those of the
+    mean shape operator; the guide's page on scales has the formulas. H = (k1 + k2) / 2, but K is not k1 k2.
+    NaN where a vertex without value has a part in a mean: with boundary="nan" wherever a border has. Else
+    means end at borders. There are no standard errors, as those of neighbours are not independent.
 
     Examples
     --------
@@ -79,11 +93,14 @@ def curvatures(
     >>> bool(np.abs(found.k1 - 0.5).max() < 5e-3)
     True
     """
-    chosen = _as_fit(scheme)
-    mesh = parts.in_parts(_taken(mesh), chosen)
+    chosen, scale = _as_fit(scheme), None if radius is None else drivers.checked_radius(radius)
+    mesh = _taken(mesh) if scale else parts.in_parts(_taken(mesh), chosen)
     if isinstance(mesh, ChunkedGrid):
+        if scale:
+            raise ValueError("radius: means reach beyond the chunks of a grid; give it as one in memory")
         return parts.curvatures(mesh, chosen, boundary)
-    return _split(mesh, _fitted(mesh, chosen, boundary))
+    found = _fitted(mesh, chosen, boundary)
+    return _split(mesh, found if scale is None else drivers.averaged(mesh, found, scale))
 
 
 def principal_curvatures(

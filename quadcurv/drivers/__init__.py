@@ -11,13 +11,14 @@ import scipy
 
 from quadcurv.boundary import checked_boundary, one_rings
 from quadcurv.drivers import blocks, compiled, device, direct, fits
+from quadcurv.drivers.averages import averaged, checked_radius
 from quadcurv.drivers.fits import each
 from quadcurv.mesh import GridBlocks, Mesh, QuadGrid, QuadMesh, StaggeredGrid
 from quadcurv.schemes import Curvatures, Fit, Laplacian
 from quadcurv.stencils import Stencils
 from quadcurv.types import Floats
 
-__all__ = ["apply", "each", "fit", "has_holes", "run", "stiffness"]
+__all__ = ["apply", "averaged", "checked_radius", "each", "fit", "has_holes", "run", "stiffness"]
 
 
 # The quads of a staggered grid cover it twice, once for its cells and once for their corners: so that the
