@@ -53,3 +53,32 @@ def table(goals: Sequence[Goal]) -> list[str]:
         asked = ["" if np.isnan(x) else f"{x:.3g}" for x in (g.must, g.aim)]
         lines.append(f"| {g.name} | {g.value:.3g} | {' | '.join(asked)} | {g.verdict} | {g.where} |")
     return lines
+
+
+@dataclass(frozen=True)
+class Ratio:
+    """A ratio of two times (or bytes): median and quartiles over the rounds, and what it is to reach.
+
+    Attributes
+    ----------
+    name, against : str
+    vertices, threads : int
+    low, median, high : float
+    must, aim : float
+        NaN where nothing is asked. A ratio that has to be small has must >= aim, others must <= aim.
+    """
+
+    name: str
+    against: str
+    vertices: int
+    threads: int
+    low: float
+    median: float
+    high: float
+    must: float = np.nan
+    aim: float = np.nan
+
+    @property
+    def verdict(self) -> str:
+        """Which of the two is reached."""
+        return verdict(self.median, self.must, self.aim)

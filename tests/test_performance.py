@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 import quadcurv as qc
-from comparisons import performance
+from comparisons import fresh, operations, performance
+from comparisons.goals import Ratio
 
 
 @pytest.mark.filterwarnings("default")
@@ -24,11 +25,14 @@ def test_quick_run(tmp_path):
         "peak memory",
         "first call",
         "nothing compiled",
+        "igl.cotmatrix(V, I, C)",
     ):
         assert name in report
     names = {(r.name, r.against, r.threads) for r in found["ratios"]}
     assert ("finite_volume, open grid", "copy", 2) in names
     assert ("stiffness in place", "igl.cotmatrix", 1) in names
+    for scheme in performance.QUAD_MATRICES:
+        assert (f"stiffness, {scheme}", "igl.cotmatrix(V, I, C)", 2) in names
     assert all(0 < r.low <= r.median <= r.high for r in found["ratios"])
     for figure in ("performance-time", "performance-goals"):
         assert (tmp_path / f"{figure}.png").stat().st_size > 10_000
@@ -37,13 +41,13 @@ def test_quick_run(tmp_path):
 
 def test_operations_are_less_than_half_of_the_thesis():
     """By hand: cross 9, dot 5, root, quotient, 3 to scale; 2 crosses; ring's cross, dot, root, quotient."""
-    counted = performance.operations()
+    counted = operations.operations()
     assert counted["normal"] == 9 + 5 + 1 + 1 + 3
     assert counted["fluxes"] == 9 + 9
     assert counted["area"] == 9 + 5 + 1 + 1
     assert counted["all"] == 12 + 19 + 18 + 9 + 16 + 3
-    assert performance.operations(newton=True)["all"] - counted["all"] == 2 * (3 + 5 + 3 + 7 - 2)
-    assert counted["all"] < performance.THESIS_OPERATIONS / 2
+    assert operations.operations(newton=True)["all"] - counted["all"] == 2 * (3 + 5 + 3 + 7 - 2)
+    assert counted["all"] < operations.THESIS / 2
 
 
 def test_the_numpy_scheme_is_the_scheme():
@@ -68,4 +72,17 @@ def test_growth_is_the_slope():
     ],
 )
 def test_verdicts_know_which_way_is_better(median, must, aim, verdict):
-    assert performance.Ratio("a", "b", 1, 1, median, median, median, must, aim).verdict == verdict
+    assert Ratio("a", "b", 1, 1, median, median, median, must, aim).verdict == verdict
+
+
+def test_another_checkout_is_measured_in_turn():
+    """Beside itself every warm call takes about as long; a folder without quadcurv of its own is told."""
+    found = list(fresh.beside(fresh.HERE, 3, (64, 32, 16)))
+    names = [r.name for r in found]
+    assert len(set(names)) == len(names) == 9
+    assert all(r.against == "the other checkout" and 0.1 < r.median < 10 for r in found)
+
+
+def test_a_job_that_fails_is_told():
+    with pytest.raises(RuntimeError, match="ended with"):
+        fresh.Worker(fresh.HERE, 0, 0, 0)
