@@ -15,7 +15,7 @@ from llvmlite.binding import get_host_cpu_features
 from numba import config, njit
 
 import quadcurv as qc
-from comparisons.performance import interpreted
+from comparisons.operations import interpreted
 from quadcurv import SCHEMES, QuadGrid, QuadMesh, StaggeredGrid
 from quadcurv.kernels import extent, formulas, order, ranges, rows, topology, vector
 
