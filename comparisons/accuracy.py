@@ -28,6 +28,7 @@ import quadcurv as qc
 from comparisons import cases
 from comparisons.cases import Array, Case
 from comparisons.goals import Goal, table
+from comparisons.peers import hindsight
 from quadcurv.refinement import fitted_rate
 from quadcurv.schemes import SCHEMES, Fit, Laplacian
 
@@ -140,10 +141,10 @@ NOISE = (1e-4, 1e-3, 1e-2, 5e-2, 0.1, 0.3)
 
 
 def error_bars(found: qc.Curvatures, name: str) -> Array | None:
-    """Half the width of the 95 % interval; two-sided normal where there are standard errors alone."""
-    half = getattr(found, "half_width", None)
-    if half is not None:
-        return np.asarray(getattr(half(0.95), name))
+    """Half the width of the 95 % interval, by 1.96 standard errors where a scheme gives these alone."""
+    interval = getattr(found, "interval", None)
+    if interval is not None:
+        return np.asarray(getattr(interval, name))
     errors = found.standard_error
     return None if errors is None else 1.96 * np.asarray(getattr(errors, name))
 
@@ -175,7 +176,7 @@ def coverage(schemes: Sequence[str]) -> Iterator[tuple[str, str, float, str, flo
 
 
 def estimates(scheme: str) -> Iterator[tuple[str, float, float]]:
-    """Surface, rank correlation and size over the true error of what a fit gives as its error, no noise."""
+    """Surface, rank correlation and size over the true error of half an interval's half width, no noise."""
     meshes = {
         **surfaces(),
         "jittered": cases.ellipsoid().jittered(cases.cubed(16), 0.2),
@@ -183,13 +184,11 @@ def estimates(scheme: str) -> Iterator[tuple[str, float, float]]:
     }
     for name, case in meshes.items():
         found = fit(case, scheme)
-        bars = getattr(found, "bias", None)  # what a smooth surface leaves, where a scheme says
-        if bars is None:
-            bars = found.standard_error
+        bars = error_bars(found, "mean")
         if bars is None:
             yield name, NAN, NAN
             continue
-        error, bar = np.abs(found.mean - case.H), np.abs(np.asarray(bars.mean))
+        error, bar = np.abs(found.mean - case.H), bars / 2
         known = np.isfinite(error) & np.isfinite(bar)
         yield (
             name,
@@ -264,27 +263,23 @@ def coarse() -> dict[str, Case]:
     }
 
 
-def hindsight(case: Case, scheme: str) -> float:
-    """Mean error of H of the best of all other operators, each where it has a value."""
-    known = np.isfinite(case.H)
-    return min(_average(qc.mean_curvature(case.mesh, s), case.H, known) for s in SCHEMES if s != scheme)
-
-
 def low_poly(scheme: str) -> Iterator[tuple[str, float, float, float]]:
-    """Share of vertices without a value; mean errors of H by the fit and by the best other, in hindsight."""
-    for name, case in coarse().items():
+    """Share of vertices without a value; mean errors of H by the fit and by the best peer, in hindsight."""
+    meshes = coarse()
+    for (name, case), best in zip(meshes.items(), hindsight(list(meshes.values())), strict=True):
         H = fit(case, scheme).mean
-        own = np.abs(H - case.H)
-        yield name, float(np.isnan(H).mean()), float(np.nanmean(own)), hindsight(case, scheme)
+        yield name, float(np.isnan(H).mean()), float(np.nanmean(np.abs(H - case.H))), best
 
 
 def noise_errors(scheme: str) -> Iterator[tuple[str, float, float]]:
-    """Mean errors of H under noise by the fit and by the best other operator, in hindsight."""
-    for surface, smooth in surfaces().items():
-        for level in (1e-3, 1e-2, 5e-2, 0.3):
-            case = smooth.noisy(level)
-            own = float(np.nanmean(np.abs(fit(case, scheme).mean - case.H)))
-            yield f"{surface}, noise {level:g}", own, hindsight(case, scheme)
+    """Mean errors of H under noise by the fit and by the best peer at its best setting, in hindsight."""
+    meshes = {
+        f"{surface}, noise {level:g}": smooth.noisy(level)
+        for surface, smooth in surfaces().items()
+        for level in (1e-3, 1e-2, 5e-2, 0.3)
+    }
+    for (name, case), best in zip(meshes.items(), hindsight(list(meshes.values())), strict=True):
+        yield name, _average(fit(case, scheme).mean, case.H, np.isfinite(case.H)), best
 
 
 def _worst(H: Array, true: Array, at: Array) -> float:
@@ -471,17 +466,15 @@ def few(scheme: str) -> Part:
     part = Part()
     rows = list(low_poly(scheme))
     part.most("low poly: share without a value", {n: share for n, share, _, _ in rows}, 0, 0)
-    part.most(
-        "low poly: error over the best of all others", {n: own / best for n, _, own, best in rows}, 1, 0.7
-    )
-    part.detail("low poly", ("mesh", "without", "ours", "best other"), rows)
+    part.most("low poly: error over the best peer's", {n: own / best for n, _, own, best in rows}, 1, 0.7)
+    part.detail("low poly", ("mesh", "without", "ours", "best peer"), rows)
     return part
 
 
 def noise(scheme: str) -> Part:
     """Errors under noise."""
     part = Part()
-    _ratios(part, "noise 1e-3 to 0.3, error over the best other's", list(noise_errors(scheme)), 1, 0.5)
+    _ratios(part, "noise 1e-3 to 0.3, error over the best peer's", list(noise_errors(scheme)), 1, 0.5)
     return part
 
 

@@ -7,6 +7,7 @@ brought to ours: H rather than 2 H, pointwise rather than integrated, positive o
 from __future__ import annotations
 
 import importlib
+import warnings
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
@@ -60,7 +61,9 @@ class Method:
             return cgal.program(OUTPUT)[1]
         for name in (self.library, *self.needs):
             try:
-                importlib.import_module(name)
+                with warnings.catch_warnings():
+                    warnings.simplefilter("ignore")  # of what they import in their turn
+                    importlib.import_module(name)
             except ImportError as error:
                 return str(error)
         return ""

@@ -138,15 +138,17 @@ def _surveyed(first: int, name: str, n: int, cost_size: int) -> Iterator[Cost | 
     yield from errors(method, n, max(first - 1, 0))
 
 
-def hindsight(case: Case, quantity: str = "H") -> float:
-    """Mean error of the best peer on a mesh, of those with values at 99 % of the vertices at least."""
-    records = surviving(_measured, len(PEERS), case)
-    return min(error(r, quantity) for r in records if r is not None and complete(r, quantity))
+def hindsight(chosen: Sequence[Case], quantity: str = "H") -> list[float]:
+    """Mean error of the best peer on each mesh, of those with values at 99 % of the vertices at least."""
+    records = surviving(_measured, len(chosen) * len(PEERS), chosen)
+    by_mesh = [records[i : i + len(PEERS)] for i in range(0, len(records), len(PEERS))]
+    return [min(error(r, quantity) for r in some if r and complete(r, quantity)) for some in by_mesh]
 
 
-def _measured(first: int, case: Case) -> Iterator[Record]:
-    for method in PEERS[first:]:
-        yield {"without": 0, "vertices": 1} if method.missing else measured(method, case)
+def _measured(first: int, chosen: Sequence[Case]) -> Iterator[Record]:
+    pairs = [(case, method) for case in chosen for method in PEERS]
+    for case, method in pairs[first:]:
+        yield {} if method.missing else measured(method, case)
 
 
 # Who is first -------------------------------------------------------------------------------------

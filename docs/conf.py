@@ -78,7 +78,7 @@ html_theme_options = {
     "footer_end": [],
     "header_links_before_dropdown": 6,
 }
-html_sidebars = {"start": [], "theory": [], "performance": [], "peers": [], "contributing": []}
+html_sidebars = {"start": [], "theory": [], "performance": [], "peers": [], "trust": [], "contributing": []}
 
 
 def _escape(app, what, name, obj, options, lines):

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from quadcurv.mesh import Mesh, QuadGrid, StaggeredGrid
-from quadcurv.schemes import Curvatures
+from quadcurv.schemes import Curvatures, StandardErrors
 from quadcurv.types import Floats
 
 
@@ -36,14 +36,14 @@ def averaged(mesh: Mesh, found: Curvatures, radius: float) -> Curvatures:
         means = sums / areas[:, None]
         normal = means[:, 4:7] / np.linalg.norm(means[:, 4:7], axis=1)[:, None]
     direction1, direction2 = _principal(means[:, 7:].reshape(-1, 3, 3), normal)
-    H, K, k1, k2 = (mesh.in_shape(means[:, k]) for k in range(4))
-    directions = (mesh.in_shape(d) for d in (direction1, direction2, normal))
-    return replace(
-        found,
-        **dict(zip(("mean", "gaussian", "k1", "k2"), (H, K, k1, k2), strict=True)),
-        **dict(zip(("direction1", "direction2", "normal"), directions, strict=True)),
-        standard_error=None,
-    )
+    columns = {"mean": 0, "gaussian": 1, "k1": 2, "k2": 3}
+    changed: dict[str, Any] = {name: mesh.in_shape(means[:, k]) for name, k in columns.items()}
+    for name, values in (("direction1", direction1), ("direction2", direction2), ("normal", normal)):
+        changed[name] = mesh.in_shape(values)
+    for name, value in vars(found).items():
+        if isinstance(value, StandardErrors):
+            changed[name] = None
+    return replace(found, **changed)
 
 
 def _cells(grid: StaggeredGrid) -> Any:
