@@ -37,6 +37,8 @@ SEEDS = (0, 1, 2)
 QUANTITIES = ("mean", "gaussian", "k1", "k2")
 Records = list[tuple[str, ...]]
 NAN = float("nan")
+ROUNDING = 1e-11
+"""Errors of H below it are rounding, which has no order: what is exact is of every order."""
 
 
 def fit(case: Case, scheme: str) -> qc.Curvatures:
@@ -81,7 +83,8 @@ def smooth_orders(scheme: str) -> Iterator[tuple[str, float, Array]]:
             error = np.abs(qc.mean_curvature(grid, scheme) - surface.mean_curvature(xi, eta))
             inside = [slice(None) if wraps else slice(n // 6, -(n // 6)) for wraps in surface.wrap]
             found.append(error[tuple(inside)].max())
-        yield name, fitted_rate((32, 64, 128), found), np.array(found)
+        exact = found[0] < ROUNDING
+        yield name, np.inf if exact else fitted_rate((32, 64, 128), found), np.array(found)
 
 
 def jitter_orders(scheme: str) -> Iterator[tuple[str, float, Array]]:
@@ -429,9 +432,13 @@ def bars(scheme: str) -> Part:
     for name in dict.fromkeys(row[0] for row in rows):
         by = {f"{row[1]}, {row[3]}, noise {row[2]:g}": row[4] for row in rows if row[0] == name}
         part.least(f"coverage of 95 % intervals, {name}: least", by, 0.9, 0.94)
-        mean = {"all": float(np.mean(list(by.values())))}
-        part.least(f"coverage of 95 % intervals, {name}: mean", mean, 0.92, 0.94)
-        part.most(f"coverage of 95 % intervals, {name}: mean, not too wide", mean, 0.98, 0.96)
+        mean = float(np.mean(list(by.values())))
+        part.most(
+            f"coverage of 95 % intervals, {name}: mean, off 0.95",
+            {f"{mean:.3f}": abs(mean - 0.95)},
+            0.03,
+            0.01,
+        )
     part.detail(
         "coverage of 95 % intervals",
         ("scheme", "surface", "noise", "quantity", "coverage", "mean error"),
@@ -455,8 +462,8 @@ def features(scheme: str) -> Part:
     part.detail("creases", ("where", "ours", "best Laplacian", "standard error", "flagged"), rows)
     _ratios(part, "fillets of 4 and 8 cells, error over the best Laplacian's", list(fillets(scheme)), 1, 0.5)
     knife = list(knives(scheme))
-    part.most("knife edges: |k| x thickness where not flagged", dict(knife), 1, 0.5)
-    part.detail("knife edges", ("where", "|k| x thickness"), knife)
+    part.most("knife edges: largest curvature x thickness, where not flagged", dict(knife), 1, 0.5)
+    part.detail("knife edges", ("where", "largest curvature x thickness"), knife)
     _ratios(part, "aspect 20:1 and 100:1, error over Liu's", list(stretched(scheme)), 1, 0.5)
     return part
 

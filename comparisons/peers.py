@@ -1,6 +1,7 @@
 """H, K, k1 and k2 by every library at hand beside our schemes: errors on 16 meshes, time and memory.
 
     python -m comparisons.peers           PEERS.md is written, in some minutes
+    python -m comparisons.peers --ours    our schemes alone anew, other libraries as in the last run
     python -m comparisons.peers --quick   coarser meshes, into the output folder
 
 Libraries that are not installed are left out, and named; see :mod:`comparisons.libraries`.
@@ -8,7 +9,9 @@ Libraries that are not installed are left out, and named; see :mod:`comparisons.
 
 from __future__ import annotations
 
+import argparse
 import contextlib
+import json
 import resource
 import time
 import warnings
@@ -24,7 +27,7 @@ from rich.console import Console
 from comparisons import cases
 from comparisons.cases import Case
 from comparisons.children import surviving
-from comparisons.common import arguments
+from comparisons.common import OUTPUT
 from comparisons.figures import COLOURS, MARKERS, figure, paper_style, save_figure
 from comparisons.libraries import OURS, PEERS, QUANTITIES, Method, ours, quirks
 from quadcurv.schemes import SCHEMES, Laplacian
@@ -439,29 +442,51 @@ def draw(records: Sequence[Record], output: Path) -> None:
     save_figure(fig, output, "peers")
 
 
-def save(records: Sequence[Record], output: Path) -> None:
-    """Write all numbers as CSV, NaN where a method has no such quantity."""
+def save(records: Sequence[Record], cost: Mapping[str, Cost], output: Path) -> None:
+    """Write all that was measured as JSON, and the errors as CSV, NaN where a method has no such quantity."""
+    output.mkdir(parents=True, exist_ok=True)
     columns = ["mesh", "method", "ours", "vertices", "without", "seconds"]
     columns += [f"{q} {norm}" for q in QUANTITIES for norm in ("mean", "max")]
     write_csv(output / "peers.csv", by_column([{c: r.get(c, np.nan) for c in columns} for r in records]))
+    (output / "peers.json").write_text(json.dumps({"records": records, "cost": cost}))
+
+
+def others(output: Path, methods: Sequence[Method]) -> tuple[list[Record], dict[str, Cost]]:
+    """What the last run in a folder says of methods.
+
+    Raises
+    ------
+    ValueError
+        It was of other methods or meshes.
+    """
+    given = json.loads((output / "peers.json").read_text())
+    names = {m.name for m in methods}
+    records = [r for r in given["records"] if r["method"] in names]
+    if {(r["mesh"], r["method"]) for r in records} != {(mesh, name) for mesh in MESHES for name in names}:
+        raise ValueError(f"{output / 'peers.json'} is of other methods or meshes: run without --ours")
+    return records, {name: Cost(*given["cost"][name]) for name in names}
 
 
 def main() -> None:
     """Measure, and write PEERS.md, the figure and the numbers behind them."""
-    options = arguments(__doc__)
+    raw = argparse.RawDescriptionHelpFormatter
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=raw)
+    parser.add_argument("--output", type=Path, default=OUTPUT, help="folder for figures and tables")
+    parser.add_argument("--quick", action="store_true", help="coarser meshes, into the folder")
+    parser.add_argument("--ours", action="store_true", help="other libraries as in the last run there")
+    options = parser.parse_args()
     console = Console()
     start = time.perf_counter(), processor()
-    methods = [m for m in PEERS if not m.missing] + list(ours())
+    own, rest = list(ours()), [m for m in PEERS if not m.missing]
+    methods = rest + own
     n, cost_size = (QUICK, 16) if options.quick else (FULL, 64)
-    records: list[Record] = []
-    cost: dict[str, Cost] = {}
-    for method in methods:
+    records, cost = others(options.output, rest) if options.ours else ([], {})
+    for method in own if options.ours else methods:
         found, cost[method.name] = survey(method.name, n, cost_size)
         records += found
         console.print(f"{method.name}: {time.perf_counter() - start[0]:.0f} s", highlight=False)
     records.sort(key=lambda r: list(MESHES).index(r["mesh"]))
-    options.output.mkdir(parents=True, exist_ok=True)
-    save(records, options.output)
+    save(records, cost, options.output)
     draw(records, options.output)
     text = markdown(records, cost, cost_size, methods)
     target = options.output / "PEERS.md" if options.quick else Path(__file__).with_name("PEERS.md")

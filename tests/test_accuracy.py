@@ -35,7 +35,7 @@ def test_star_is_smooth_and_has_saddles():
         case = cases.on(cases.STAR, cases.catmull_clark(cases.dodecahedron(), level))
         errors.append(np.abs(qc.gaussian_curvature(case.mesh, "jet") - case.K).mean())
     assert case.K.min() < -0.3 < 5 < case.K.max()
-    assert errors[1] < errors[0] / 6
+    assert errors[1] < errors[0] / 4
     assert errors[1] < 0.02
 
 

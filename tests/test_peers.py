@@ -200,7 +200,13 @@ def test_records_table_and_figure(tmp_path):
     assert len(records) == 16 * len(methods)
     assert {r["mesh"] for r in records} == set(peers.MESHES)
     peers.draw(records, tmp_path)
-    peers.save(records, tmp_path)
+    cost = {m.name: peers.Cost(1.0, np.nan) for m in methods}
+    peers.save(records, cost, tmp_path)
+    again, known = peers.others(tmp_path, methods[2:])
+    assert again == [r for r in records if r["method"].startswith("libigl")]
+    assert set(known) == {m.name for m in methods[2:]}
+    with pytest.raises(ValueError, match="is of other methods or meshes"):
+        peers.others(tmp_path, [*methods, ALL["liu"]])
     assert (tmp_path / "peers.png").stat().st_size > 10_000
     assert (tmp_path / "peers.csv").read_text().count("\n") == len(records) + 1
     text = peers.markdown(records, {"jet": peers.Cost(1.0, 2.0)}, 8, methods)

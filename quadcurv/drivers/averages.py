@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from quadcurv.mesh import Mesh, QuadGrid, StaggeredGrid
+from quadcurv.mesh import GridBlocks, Mesh, QuadGrid, StaggeredGrid
 from quadcurv.schemes import Curvatures, StandardErrors
 from quadcurv.types import Floats
 
@@ -20,9 +20,12 @@ def checked_radius(radius: Any) -> float:
     return float(radius)
 
 
-def averaged(mesh: Mesh, found: Curvatures, radius: float) -> Curvatures:
+def averaged(mesh: Mesh | GridBlocks, found: Curvatures, radius: float) -> Curvatures:
     """Means over balls of a radius, as `curvatures` describes them."""
     from quadcurv.kernels import discs
+
+    if isinstance(mesh, GridBlocks):
+        mesh = mesh.to_mesh()
 
     def flat(values: Floats) -> Floats:
         return mesh.flat(values)
