@@ -88,7 +88,7 @@ def summary(mesh: Any, schemes: Iterable[str] | None = None, boundary: str = "ex
         were split into triangles. ``turned``: faces turned to agree with their neighbours.
         ``coincident``: vertices at the very position of another one, as on the two sides of a seam.
         ``valence``: vertices by number of faces. ``boundary``: vertices whose ring is "interior",
-        "extrapolated" or "open", see :func:`quadcurv.boundary.boundary_treatment`. ``undefined``:
+        "extrapolated", "fitted" or "open", see :func:`quadcurv.boundary.boundary_treatment`. ``undefined``:
         vertices without mean curvature, by scheme.
 
     Raises
@@ -118,10 +118,11 @@ def summary(mesh: Any, schemes: Iterable[str] | None = None, boundary: str = "ex
         "coincident": stencils.n - len(np.unique(stencils.points[: stencils.n] + 0.0, axis=0)),
         "valence": {k: int(count) for k, count in enumerate(np.bincount(stencils.valence)) if count},
         "boundary": {
-            name: int(np.count_nonzero(np.isin(treatment, codes)))
-            for name, codes in (
+            name: int(np.count_nonzero(treatment == code))
+            for name, code in (
                 ("interior", INTERIOR),
-                ("extrapolated", (EXTRAPOLATED, FITTED)),
+                ("extrapolated", EXTRAPOLATED),
+                ("fitted", FITTED),
                 ("open", OPEN),
             )
         },

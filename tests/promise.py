@@ -101,8 +101,10 @@ def sample(name: str, n: int) -> Sample:
 @cache
 def undamaged_error(name: str, n: int, scheme: str) -> float:
     s = sample(name, n)
+    # What "auto" chooses depends on the mesh: a vertex off the surface makes it choose smoother fits.
+    others = [undamaged_error(name, n, "jet-2")] if scheme == "jet-auto" else []
     H = qc.mean_curvature(qc.QuadGrid(s.points, s.surface.wrap), scheme)
-    return float(np.nanmax(np.abs(H - s.H)))
+    return max(float(np.nanmax(np.abs(H - s.H))), *others, 0.0)
 
 
 @cache

@@ -9,7 +9,16 @@ import numpy as np
 import pytest
 
 import quadcurv as qc
-from quadcurv import MeshError, MeshWarning, PrecisionWarning, QuadGrid, QuadMesh, curvature, surfaces
+from quadcurv import (
+    MeshError,
+    MeshWarning,
+    PrecisionWarning,
+    QuadGrid,
+    QuadMesh,
+    StaggeredGrid,
+    curvature,
+    surfaces,
+)
 from quadcurv.precision import rounding_error
 from quadcurv.refinement import fitted_rate
 from quadcurv.schemes import SCHEMES, Fit, SchemeName
@@ -189,6 +198,31 @@ def test_a_wrap_whose_first_row_is_repeated_is_refused(axis, offset, dtype):
         QuadGrid((1e-3 * repeated + offset * 1e-3).astype(dtype), (True, True))
     assert QuadGrid(repeated, (axis == 1, axis == 0)).shape == repeated.shape[:2]
     QuadGrid(grid.points, (True, True))
+
+
+@pytest.mark.parametrize("axis", [0, 1])
+@pytest.mark.parametrize("count", [2, 3])
+def test_a_wrap_whose_first_rows_are_repeated_is_refused(axis, count):
+    grid = surfaces.torus().sample((24, 30))[0]
+    repeated = np.concatenate((grid.points, grid.points.take(range(count), axis)), axis)
+    for view in (repeated, np.flip(repeated, axis)):
+        with pytest.raises(MeshError, match=f"wrap: the last {count} of the .* repeat the first ones"):
+            QuadGrid(view, (True, True))
+
+
+@pytest.mark.parametrize("axis", [0, 1])
+@pytest.mark.parametrize("count", [1, 2])
+def test_cells_that_a_wrap_repeats_are_refused(axis, count):
+    p, t = np.linspace(0.5, 2.5, 25), np.linspace(0, 2 * np.pi, 49)
+    x = np.stack(np.broadcast_arrays(np.cos(t), np.sin(t), p[:, None]), axis=-1)
+    x[:, -1] = x[:, 0]
+    primal, dual = x[1::2, 1::2], x[::2, ::2]
+    repeated = np.concatenate((primal, primal[:, :count]), axis=1)
+    corners = np.concatenate((dual[:, :-1], dual[:, :count], dual[:, :1]), axis=1)
+    if axis == 0:
+        repeated, corners = np.swapaxes(repeated, 0, 1), np.swapaxes(corners, 0, 1)
+    with pytest.raises(MeshError, match=r"wrap: the last .* as primal\[:"):
+        StaggeredGrid(repeated, corners, (axis == 0, axis == 1))
 
 
 # ---- rounding -------------------------------------------------------------------------------------------

@@ -174,7 +174,7 @@ def test_summary():
     assert sum(found["valence"].values()) == 15
     assert found["valence"][0] == 1
     assert found["valence"][1] == 4
-    assert found["boundary"] == {"interior": 10, "extrapolated": 0, "open": 5}
+    assert found["boundary"] == {"interior": 10, "extrapolated": 0, "fitted": 0, "open": 5}
     assert list(found["undefined"]) == list(SCHEMES)
     assert {found["undefined"][name] for name in LAPLACIANS} == {5}
 
@@ -185,7 +185,7 @@ def test_summary_of_grids():
     found = summary(grid, ["liu"])
     assert {name: found[name] for name in expected} == expected
     assert found["valence"] == {2: 20, 4: 70}
-    assert found["boundary"] == {"interior": 70, "extrapolated": 20, "open": 0}
+    assert found["boundary"] == {"interior": 70, "extrapolated": 20, "fitted": 0, "open": 0}
     assert found["undefined"] == {"liu": 0}
     assert summary(grid, ["liu"], boundary="nan")["undefined"] == {"liu": 20}
     with pytest.raises(ValueError, match="scheme: expected one of"):
@@ -215,7 +215,7 @@ def test_real_meshes(shared_meshes):
         found = summary(mesh)
         print(name, found)
         assert (found["vertices"], found["quads"], found["triangles"], found["polygons"]) == count
-        assert found["boundary"] == {"interior": count[0], "extrapolated": 0, "open": 0}
+        assert found["boundary"] == {"interior": count[0], "extrapolated": 0, "fitted": 0, "open": 0}
         undefined = found["undefined"]
         assert not any(undefined[scheme] for scheme in LAPLACIANS)
         # Where the least rings of a control mesh are steep, one ring may not determine a quadratic.

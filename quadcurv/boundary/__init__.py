@@ -5,7 +5,7 @@ ghosts, close it. With boundary="extrapolate" they come, in this order of prefer
 
 1. by index: the strips of quads inward from the border are continued by the quartic through five points,
    X_-1 = 5 X_0 - 10 X_1 + 10 X_2 - 5 X_3 + X_4, where the points are smooth functions of their index. The
-   border then has the order and the error of the inside;
+   border then has the order and the error of the inside. Where a strip has but four points, by the cubic;
 2. by arc length: the same on cumulative chord lengths, where the spacing is not smooth but the lines are;
 3. from a surface: where strips are rough, too short or not to be traced (triangles, extraordinary vertices,
    re-entrant corners), or where their ghosts do not lie outside, ghosts are read off a polynomial surface
@@ -13,7 +13,7 @@ ghosts, close it. With boundary="extrapolate" they come, in this order of prefer
 
 Where a strip is neither clearly smooth nor clearly rough the way of the least estimated error is taken.
 Open stay, and have no curvature: isolated vertices, those of several fans of faces or of an edge of more
-than two, and those whose neighbours are too few for a surface.
+than two, and those whose neighbours are too few for a surface, or leave it undetermined by half an edge.
 """
 
 from __future__ import annotations

@@ -15,6 +15,8 @@ from quadcurv.mesh.face_list import QuadMesh, summary_table, warn_of
 from quadcurv.stencils import Stencils, grid_faces
 from quadcurv.types import Bools, Floats, MeshError
 
+_REPEATED = 3  # rows at most that are looked for at both ends of a wrap
+
 
 @dataclass(frozen=True, eq=False, init=False, repr=False)
 class QuadGrid:
@@ -159,15 +161,24 @@ class QuadGrid:
         return mesh.with_roundoff(self.roundoff)
 
 
-def refuse_repetition(points: Floats, axis: int, name: str) -> None:
-    """The first row of a wrap that the last one repeats would make quads without area."""
+def refuse_repetition(points: Floats, axis: int, name: str, argument: str = "points") -> None:
+    """Rows at the end of a wrap that repeat the first ones would make quads without area, or twice."""
+    most = min(_REPEATED, points.shape[axis] - 2)
+    ends = (*range(most + 1), *range(-most, 0))
+    rows = np.moveaxis(on_host(points.take(ends, axis)), axis, 0)
     with np.errstate(invalid="ignore"):
-        first, last, second = (on_host(points.take(k, axis)) for k in (0, -1, 1))
-        gap, step = np.abs(first - last), np.abs(second - first)
-    known = np.isfinite(gap)
-    # Files in single precision, and grids far from the origin, repeat a row to some digits only.
-    if known.any() and gap[known].max() <= 1e-3 * np.nanmax(step, initial=0.0) > 0:
+        step = np.nanmax(np.abs(rows[1] - rows[0]), initial=0.0)
+        gaps = [np.abs(rows[-count:] - rows[:count]) for count in range(1, most + 1)]
+    for count, gap in enumerate(gaps, 1):
+        known = np.isfinite(gap)
+        # Files in single precision, and grids far from the origin, repeat a row to some digits only.
+        if not known.any() or not gap[known].max() <= 1e-3 * step > 0:
+            continue
+        if count == 1:
+            what = f"the last of the {name} repeats the first one, which follows it"
+        else:
+            what = f"the last {count} of the {name} repeat the first ones, which follow them"
+        left = f"[:-{count}]" if axis == 0 else f"[:, :-{count}]"
         raise MeshError(
-            f"wrap: the last of the {name} repeats the first one, which follows it where the grid wraps: "
-            f"leave it out, as points{'[:-1]' if axis == 0 else '[:, :-1]'} does"
+            f"wrap: {what} where the grid wraps: leave out what is repeated, as {argument}{left} does"
         )

@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from quadcurv.checks import Report, checked_points, checked_wrap, unit_roundoff
 from quadcurv.mesh.face_list import summary_table
+from quadcurv.mesh.grid import refuse_repetition
 from quadcurv.stencils import Stencils
 from quadcurv.types import Floats, Ints, MeshError
 
@@ -77,6 +78,7 @@ class StaggeredGrid:
                 continue
             if self.shape[axis] < 3:
                 raise MeshError(f"primal: {self.shape[axis]} {name}, at least 3 are needed to wrap")
+            refuse_repetition(self.primal, axis, name, "primal")
             gap = np.abs(self.dual.take(0, axis) - self.dual.take(-1, axis)).max()
             if gap > _SEAM * np.ptp(self.dual.reshape(-1, 3), axis=0).max():
                 raise MeshError(f"dual: first and last {name} differ by {gap:.3g} although they wrap")
