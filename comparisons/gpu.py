@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 
 import quadcurv as qc
+from comparisons.scale import Setting
 
 HEADER = ("mesh", "vertices", "result", "ns a vertex", "over a copy", "beside the processor")
 NOT_MEASURED = "Not measured: {}. `python -m comparisons.gpu` measures where there is one."
@@ -31,6 +32,11 @@ def no_device() -> str | None:
     import cupy
 
     return None if cupy.cuda.is_available() else "there was no device"
+
+
+def section(setting: Setting) -> list[str]:
+    """The lines of a section of `SCALE.md`."""
+    return lines(setting.quick)
 
 
 def lines(quick: bool = False) -> list[str]:

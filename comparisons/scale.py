@@ -128,6 +128,8 @@ def table(header: Sequence[str], rows: Sequence[Sequence[object]]) -> list[str]:
 SECTIONS: dict[str, tuple[str, str]] = {
     "grids": ("Grids from disk", "comparisons.scale_grids:section"),
     "dask": ("Grids through dask", "comparisons.scale_grids:dask_section"),
+    "faces": ("Face lists in parts", "comparisons.scale_faces:section"),
+    "gpu": ("On a graphics processor", "comparisons.gpu:section"),
     "paper": ("On paper", "comparisons.scale_paper:section"),
 }
 """By name: the heading, and the `Section` that measures, as "module:function"."""

@@ -3,7 +3,13 @@
 from __future__ import annotations
 
 import os
+import pickle
+import signal
+import sys
+import threading
 import time
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -12,53 +18,56 @@ import numpy as np
 import quadcurv as qc
 from comparisons.scale import Setting, begin, cost, table
 
-# Vertices a side of a torus; the last one is measured where QUADCURV_LARGE is set.
-SIDES, LARGE = (2048, 4096), 8192
-_WHOLE = 4096  # vertices a side up to which one mesh in memory is measured beside
+# Vertices a side of a torus, natural and shuffled; the large one is measured where QUADCURV_LARGE is set.
+SIDE, SHUFFLED, LARGE = 4096, 2048, 8192
 _ROWS = 256
+_HERE = (("into parts", "cut", ()), ("part by part", "by_parts", (0,)))
+_WORKERS = (("1 worker", "by_parts", (1,)), ("2 workers", "by_parts", (2,)))
+_WHOLE = (("one mesh in memory", "in_memory", ()),)
 
 
 def section(setting: Setting) -> list[str]:
     """The lines of the report."""
-    sides = (128,) if setting.quick else SIDES + ((LARGE,) if os.environ.get("QUADCURV_LARGE") else ())
-    header = ["mesh", "way", "CPU s", "ns a vertex", "peak MB"]
-    rows: list[list[object]] = []
-    for n in sides:
-        size = f"{n * n / 1e6:.3g}M"
-        for order in ("natural", "shuffled"):
-            if order == "shuffled" and n > sides[0]:
-                continue
-            folder = str(setting.folder / f"{order}{n}")
-            cost("comparisons.scale_faces:write", folder, n, order)
-            ways: list[tuple[str, str, tuple[Any, ...]]] = []
-            if n <= _WHOLE:
-                ways.append(("one mesh in memory", "in_memory", ()))
-            ways += [
-                ("into parts", "cut", ()),
-                ("part by part", "by_parts", (0,)),
-                *((f"{w} worker(s)", "by_parts", (w,)) for w in (1, 2)),
-            ]
-            for way, job, more in ways:
-                spent = cost(f"comparisons.scale_faces:{job}", folder, *more)
-                rows.append(
-                    [
-                        f"{size}, {order}",
-                        way,
-                        spent.cpu,
-                        spent.cpu / (n * n) * 1e9,
-                        spent.told.get("peak", spent.peak),
-                    ]
-                )
-                told = spent.told.get("same")
-                if told is False:
-                    raise AssertionError(f"{size}, {order}: {way} is not bitwise one mesh")
-    lines = table(header, rows)
-    killed = cost("comparisons.scale_faces:killed", str(setting.folder / f"natural{sides[0]}"))
-    word = "bitwise the same" if killed.told["same"] else "DIFFERENT"
-    lines += ["", f"One of two workers killed after a third of the parts: {word}."]
-    if not setting.quick and LARGE not in sides:
+    side, other = (128, 96) if setting.quick else (SIDE, SHUFFLED)
+    large = bool(os.environ.get("QUADCURV_LARGE")) and not setting.quick
+    rows = measured(setting, side, "natural", (*_WHOLE, *_HERE, *_WORKERS))
+    rows += measured(setting, other, "shuffled", (*_WHOLE, *_HERE))
+    if large:
+        rows += measured(setting, LARGE, "natural", (*_HERE, *_WORKERS))
+    killed = cost("comparisons.scale_faces:killed", str(setting.folder / f"natural{side}"))
+    if not killed.told["same"]:
+        raise AssertionError("with a worker killed the result is not bitwise one mesh")
+    lines = [
+        "A bumpy torus of quads from .npy files, the mean curvature by finite volumes into one. *Into parts*",
+        "writes the faces of each part of about a million vertices to a file, once; the rest is without it.",
+        "What *workers* cost begins with their start, two seconds each; their peak is that of the largest",
+        "one. Peaks count pages of mapped files, which can be taken back. Wherever one mesh in memory was",
+        "measured all ways were bitwise the same.",
+        "",
+        *table(["mesh", "way", "CPU s", "ns a vertex", "peak MB"], rows),
+        "",
+        "One of two workers killed after a third of the vertices: the result was bitwise the same.",
+    ]
+    if not large:
         lines += ["", f"{LARGE**2 / 1e6:.3g}M vertices: not measured; QUADCURV_LARGE=1 measures them."]
     return lines
+
+
+Way = tuple[str, str, tuple[int, ...]]
+
+
+def measured(setting: Setting, n: int, order: str, ways: Sequence[Way]) -> list[list[object]]:
+    """Rows of the table for n x n vertices."""
+    folder, rows = str(setting.folder / f"{order}{n}"), []
+    cost("comparisons.scale_faces:write", folder, n, order)
+    for way, job, more in ways:
+        spent = cost(f"comparisons.scale_faces:{job}", folder, *more)
+        if spent.told.get("same") is False:
+            raise AssertionError(f"{n} x {n}, {order}: {way} is not bitwise one mesh")
+        peak = spent.told.get("peak", spent.peak)
+        rows.append([f"{n * n / 1e6:.3g}M, {order}", way, spent.cpu, spent.cpu / (n * n) * 1e9, peak])
+        print(*rows[-1], file=sys.stderr, flush=True)
+    return rows
 
 
 def write(folder: str, n: int, order: str) -> None:
@@ -117,22 +126,13 @@ def cut(folder: str) -> None:
     """Write parts of a million vertices."""
     _warm()
     points, faces = _mapped(folder)
-    qc.FaceParts(points, faces, Path(folder) / "parts", parts=_parts(points))
-    # Others compute from the same files.
+    parts = qc.FaceParts(points, faces, Path(folder) / "parts", parts=max(4, len(points) >> 20))
+    (Path(folder) / "parts.pickle").write_bytes(pickle.dumps(parts))
 
 
-def _parts(points: np.ndarray) -> int:
-    return max(4, len(points) >> 20)
-
-
-def _cut_before(folder: str, client: Any = None) -> qc.FaceParts:
+def _cut_before(folder: str) -> qc.FaceParts:
     """Parts that `cut` has written."""
-    import shutil
-
-    points, faces = _mapped(folder)
-    place = Path(folder) / "parts"
-    shutil.rmtree(place, ignore_errors=True)
-    return qc.FaceParts(points, faces, place, parts=_parts(points), client=client)
+    return pickle.loads((Path(folder) / "parts.pickle").read_bytes())
 
 
 def _same(folder: str, H: np.ndarray) -> bool | None:
@@ -163,19 +163,15 @@ def by_parts(folder: str, workers: int) -> dict[str, Any]:
 
 def killed(folder: str) -> dict[str, Any]:
     """One of two workers dies while they compute."""
-    import os as system
-    import signal
-    import threading
-
     parts = _cut_before(folder)
     with _cluster(2) as client:
         H = np.full(parts.shape, np.nan)
-        victim = next(iter(client.run(system.getpid).values()))
+        victim = next(iter(client.run(os.getpid).values()))
 
         def kill() -> None:
             while np.isfinite(H).mean() < 1 / 3:
                 time.sleep(0.005)
-            system.kill(victim, signal.SIGKILL)
+            os.kill(victim, signal.SIGKILL)
 
         thread = threading.Thread(target=kill)
         thread.start()
@@ -189,27 +185,23 @@ def _with(parts: qc.FaceParts, client: Any) -> qc.FaceParts:
     return parts
 
 
-def _cluster(workers: int) -> Any:
-    from contextlib import contextmanager
-
+@contextmanager
+def _cluster(workers: int) -> Iterator[Any]:
     from distributed import Client, LocalCluster
 
-    @contextmanager
-    def opened() -> Any:
-        with (
-            LocalCluster(n_workers=workers, threads_per_worker=1, dashboard_address=None) as cluster,
-            Client(cluster) as client,
-        ):
-            yield client
-
-    return opened()
+    with (
+        LocalCluster(n_workers=workers, threads_per_worker=1, dashboard_address=None) as cluster,
+        Client(cluster) as client,
+    ):
+        yield client
 
 
 def _peak() -> float:
-    """Most memory that the process held, in 10^6 bytes."""
+    """Most memory that the process held, in 10^6 bytes; what it was begun by held is not counted."""
+    status = Path("/proc/self/status")
+    if status.exists():
+        (line,) = (line for line in status.read_text().splitlines() if line.startswith("VmHWM"))
+        return int(line.split()[1]) * 1024 / 1e6
     import resource
-    import sys
 
-    return (
-        resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * (1 if sys.platform == "darwin" else 1024) / 1e6
-    )
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e6

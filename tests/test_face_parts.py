@@ -288,3 +288,14 @@ def test_a_worker_killed_in_the_middle_changes_nothing(client, tmp_path):
     timer.join()
     assert done
     check(qc.evaluate(qc.QuadMesh(points, faces), *WANTED), found)
+
+
+@pytest.mark.slow
+def test_the_comparison_measures_every_way(tmp_path):
+    """Each way is bitwise one mesh, with a worker killed too, or the comparison ends with an error."""
+    from comparisons.scale import Setting
+    from comparisons.scale_faces import section
+
+    lines = section(Setting(tmp_path, True))
+    assert sum(line.startswith("| 0.0164M, natural") for line in lines) == 5
+    assert any("worker" in line and "killed" in line for line in lines)
