@@ -29,7 +29,7 @@ def test_nothing_is_wrong_in_silence_in_many_cases(part):
 
 
 def test_a_wrong_number_would_be_seen(monkeypatch):
-    """With finite volumes twice too large most of its cases are wrong."""
+    """With finite volumes twice too large a third of its cases are wrong: small curvatures are not."""
     right = SCHEMES["finite_volume"]
     cases = [seed for seed in range(200) if "finite_volume on" in promise.verdict(seed)[1]]
     promise.undamaged_error.cache_clear()
@@ -42,4 +42,4 @@ def test_a_wrong_number_would_be_seen(monkeypatch):
     monkeypatch.setitem(SCHEMES, "finite_volume", twice)
     monkeypatch.setattr(promise, "undamaged_error", lambda name, n, scheme: before[name, n])
     found = Counter(promise.verdict(seed)[0] for seed in cases)
-    assert found["wrong"] >= len(cases) // 6
+    assert found["wrong"] >= len(cases) // 3
