@@ -213,3 +213,14 @@ def test_noise_is_averaged():
     assert error < plain / 3
     found = qc.curvatures(mesh)
     assert np.mean(found.degree == 4) > 0.9
+
+
+@pytest.mark.parametrize(("noise", "bound"), [(1e-3, 2.5e-3), (1e-2, 1e-2), (5e-2, 3e-2), (0.3, 0.12)])
+def test_more_rings_where_noise_prevails(noise, bound):
+    """Vertex by vertex, with intervals that hold."""
+    mesh, (H, *_) = noisy("cubed_ellipsoid", 24, noise)
+    found = qc.curvatures(mesh, "jet-auto")
+    error = np.abs(found.mean - H)
+    assert error.mean() < bound
+    assert np.mean(error <= found.interval.mean) > 0.92
+    assert np.unique(found.rings).size > 2

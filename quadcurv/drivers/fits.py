@@ -34,6 +34,7 @@ from quadcurv.types import Bools, Floats, Indices, Ints
 _GHOST_DEGREE, _GHOST_LAYERS = 5, 3
 ROUNDING = 2.0**-49  # of positions, and of what is computed from them
 _SURE = 0.01
+_AVERAGED = 5  # rings that normals are averaged over where noise prevails
 # Of one fit, in vertices of the finite-volume scheme.
 _WORK = 30
 _CLEARLY = 3.0  # what the standard error of a one-sided fit must be of another's to be thought larger
@@ -299,10 +300,10 @@ class _FaceNeighbourhoods:
 
     @cached_property
     def _averaged(self) -> Floats:
-        """(n, 3): normals over two rings more, of which noise leaves a fifth."""
+        """(n, 3): normals over more rings, of which noise leaves little."""
         incidence = self._incidence[:, : len(self.normals)].astype(np.float64)
         normals = self.normals
-        for _ in range(2):
+        for _ in range(_AVERAGED):
             normals = incidence.T @ (incidence @ normals)
         return normals
 

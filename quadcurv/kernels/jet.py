@@ -24,6 +24,7 @@ import numpy as np
 from quadcurv.kernels.compiled import flat, kernel
 from quadcurv.kernels.formulas import real, root, span, where
 from quadcurv.kernels.gather import BLOCKS, FARTHEST, LANES, ROWS, neighbourhoods, step, windows
+from quadcurv.kernels.shape import INDICES, curvatures, variances
 from quadcurv.kernels.vector import triple
 
 PLAIN, ROUND, SMOOTH = KINDS = range(3)
@@ -336,78 +337,6 @@ def result(A, lane, T, through, k, out, at):
     condition = where(count > 0, root((S[0] + S[2] + S[5]) * count), nan)
     for column, x in enumerate((*values, sigma, *gains, condition, *bias, square, freedom, lane[LESS + k])):
         out[at * COLUMNS + column] = x
-
-
-def variances(B):
-    """Those of the last three coefficients before the constant one, and their covariances, for sigma = 1."""
-    rows = []  # of the inverse of the factor, transposed
-    for j in range(2, 5):
-        row = {j: B[j, j]}
-        for i in range(j + 1, 6):
-            row[i] = -sum(B[i, k] * row[k] for k in range(j, i)) * B[i, i]
-        rows.append(row)
-    return [sum(rows[i][k] * rows[j][k] for k in rows[j]) for i, j in INDICES]
-
-
-INDICES = (0, 0), (0, 1), (1, 1), (0, 2), (1, 2), (2, 2)
-
-
-def curvatures(B, constant, xx, yx, yy, bend, frame, S):
-    """The first 13 columns of a result, and the standard errors of four of them for sigma = 1."""
-    right = [B[6, j] - B[5, j] * constant for j in range(5)]
-    c02 = right[4] * B[4, 4]
-    c11 = (right[3] - B[4, 3] * c02) * B[3, 3]
-    c20 = (right[2] - B[3, 2] * c11 - B[4, 2] * c02) * B[2, 2]
-    c01 = (right[1] - B[2, 1] * c20 - B[3, 1] * c11 - B[4, 1] * c02) * B[1, 1]
-    c10 = (right[0] - B[1, 0] * c01 - B[2, 0] * c20 - B[3, 0] * c11 - B[4, 0] * c02) * B[0, 0]
-
-    # d/dx = al d/dx' + be d/dy', d/dy = ga d/dy'.
-    al, be, ga = 1 / xx, -yx / (xx * yy), 1 / yy
-    p, q = al * c10 + be * c01, ga * c01
-    zxx = 2 * (al * al * c20 + al * be * c11 + be * be * c02)
-    zxy = ga * (al * c11 + 2 * be * c02)
-    zyy = 2 * ga * ga * c02
-
-    # Shape operator ((a, b), (b, c)) in the basis e1 = (1, 0, p) / e, e2 = (-p q, e^2, q) / (e W), and the
-    # sphere's.
-    e2 = 1 + p * p
-    e, W = root(e2), root(e2 + q * q)
-    a = bend / W - zxx / (e2 * W)
-    b = -(e2 * zxy - p * q * zxx) / (e2 * W * W)
-    c = bend / W - (p * p * q * q * zxx - 2 * p * q * e2 * zxy + e2 * e2 * zyy) / (e2 * W * W * W)
-    half, H = (a - c) / 2, (a + c) / 2
-    size = root(half * half + b * b)
-    # Half the angle of (half, b), the larger of cosine and sine first.
-    larger = root((1 + where(half < 0, -half, half) / size) / 2)
-    smaller = b / (2 * size * larger)
-    cos, sin = where(half < 0, smaller, larger), where(half < 0, larger, smaller)
-    cos, sin = where(size == 0, 1.0, cos), where(size == 0, 0.0, sin)
-    first, second, normal = [], [], []
-    for t1, t2, n in zip(frame[:3], frame[3:6], frame[6:], strict=True):
-        f1 = (t1 + p * n) / e
-        f2 = (-p * q * t1 + e2 * t2 + q * n) / (e * W)
-        first.append(cos * f1 + sin * f2)
-        second.append(cos * f2 - sin * f1)
-        normal.append((n - p * t1 - q * t2) / W)
-
-    # Standard errors to first order; those of the slopes are of a higher one.
-    errors = []
-    for da, db, dc in (
-        (0.5, 0.0, 0.5),
-        (c, -2 * b, a),
-        (cos * cos, 2 * cos * sin, sin * sin),
-        (sin * sin, -2 * cos * sin, cos * cos),
-    ):
-        dxx = -da / (e2 * W) + db * p * q / (e2 * W * W) - dc * p * p * q * q / (e2 * W * W * W)
-        dxy = -db / (W * W) + dc * 2 * p * q / (W * W * W)
-        dyy = -dc * e2 / (W * W * W)
-        u = 2 * al * al * dxx
-        v = 2 * al * be * dxx + ga * al * dxy
-        w = 2 * be * be * dxx + 2 * ga * be * dxy + 2 * ga * ga * dyy
-        square = u * u * S[0] + v * v * S[2] + w * w * S[5]
-        square += 2 * (u * v * S[1] + u * w * S[3] + v * w * S[4])
-        errors.append(root(where(square < 0, 0.0, square)))
-    return (H, a * c - b * b, H + size, H - size, *first, *second, *normal), errors
 
 
 @kernel

@@ -30,13 +30,16 @@ _ONE_SIDED = {(6, 3): 2e3, (6, 4): 2e3, (6, 5): 1e4, (4, 2): 1e3, (4, 3): 1e3, (
 _LEFT = {6: (0.41, 0.67), 4: (0.31, 0.62), 2: (0.06, 0.57)}
 # Times what noise explains with as many terms, from which on terms are the surface's.
 _RESOLVED = 5.0
-# Degrees and rings where noise prevails.
-_WIDE = ((6, 3), (4, 3), (4, 4), (4, 5), (2, 3), (2, 4))
+# Where noise prevails: degrees and rings if three do not do, and rings of quartics that are tried on.
+_MORE = ((4, 4), (4, 5), (2, 3), (2, 4))
+_RINGS = (4, 6, 8, 11)
+_POOL, _PART = 30, 0.6
 _CHANCE = 0.2  # of the noise's square, that means over two rings of neighbours may be off
 _QUANTILE = 0.975
 _SMALLER = ((4, 2), (2, 1))
 _DOUBT = 0.02  # of the curvature, from which errors on others are asked
-_FAR = 6  # rings over which noise is looked for where all is steep
+_NEARLY_ALL = 0.8
+_FAR = 40  # rings over which noise is looked for at most, where all is steep
 
 
 class _Found:
@@ -106,8 +109,8 @@ class _Found:
         )
 
 
-def chosen(around: Neighbourhoods) -> Curvatures:
-    """All curvatures by the best fit that each vertex can have."""
+def chosen(around: Neighbourhoods, most: int = 3) -> Curvatures:
+    """All curvatures by the best fit that each vertex can have, over `most` rings where all is noise."""
     from quadcurv.kernels import jet as kernel
 
     found = _Found(around)
@@ -128,8 +131,8 @@ def chosen(around: Neighbourhoods) -> Curvatures:
     noisy = np.concatenate((vertices[unresolved], _at_sides(around, vertices[~good], fits[~good], found)))
     if noisy.size:
         steep = vertices[np.isnan(fits[:, kernel.CONDITION])]
-        noisy = np.union1d(noisy, _steep_by_noise(around, steep, noisy))
-        _average(around, noisy, found)
+        noisy = np.union1d(noisy, _in_noise(around, vertices, steep, noisy))
+        _average(around, noisy, found, most)
     _doubted(around, np.setdiff1d(vertices[good], noisy), found)
     return found.curvatures(around.on_crease)
 
@@ -142,7 +145,8 @@ def _doubted(around: Neighbourhoods, vertices: Indices, found: _Found) -> None:
     from quadcurv.kernels import jet as kernel
 
     size = np.maximum(np.abs(found.values[vertices, kernel.K1]), np.abs(found.values[vertices, kernel.K2]))
-    vertices = vertices[found.errors(vertices)[:, 0] > _DOUBT * size]
+    least = around.rounding * found.values[vertices, kernel.GAIN]
+    vertices = vertices[found.errors(vertices)[:, 0] > np.maximum(_DOUBT * size, least)]
     for d, r in _SMALLER:
         if vertices.size == 0:
             return
@@ -153,15 +157,20 @@ def _doubted(around: Neighbourhoods, vertices: Indices, found: _Found) -> None:
         found.put(vertices[better], fits[better], d, r)
 
 
-def _steep_by_noise(around: Neighbourhoods, steep: Indices, noisy: Indices) -> Indices:
-    """Those of steep vertices most of whose neighbours that are not steep are noisy."""
-    if steep.size == 0:
-        return steep
-    evidence = np.where(around.wanted, 0.0, np.nan)
+def _in_noise(around: Neighbourhoods, vertices: Indices, steep: Indices, noisy: Indices) -> Indices:
+    """Vertices nearly all of whose neighbours are noisy, and steep ones where most of the others are."""
+    evidence = np.full(around.wanted.size, np.nan)
+    evidence[vertices] = 0.0
     evidence[steep], evidence[noisy] = np.nan, 1.0
-    for _ in range(_FAR):
+    chosen = np.zeros(evidence.size, bool)
+    for rings in range(1, _FAR + 1):
         evidence = around.pooled(evidence[:, None])[:, 0]
-    return steep[evidence[steep] > 0.5]
+        if rings == 2:
+            chosen[vertices] = evidence[vertices] > _NEARLY_ALL
+        if rings > 2 and np.isfinite(evidence[steep]).all():
+            break
+    chosen[steep] |= evidence[steep] > 0.5
+    return np.flatnonzero(chosen)
 
 
 def _at_sides(around: Neighbourhoods, vertices: Indices, first: Floats, found: _Found) -> Indices:
@@ -221,27 +230,16 @@ def _resolved(fits: Floats, d: int, rounding: float) -> Bools:
     return exact | (explained > _RESOLVED * terms * fits[:, kernel.SQUARE])
 
 
-def _average(around: Neighbourhoods, vertices: Indices, found: _Found) -> None:
+def _average(around: Neighbourhoods, vertices: Indices, found: _Found, most: int) -> None:
     """Take plain least squares at noisy vertices, of degree 4 where that is not biased, else of degree 6."""
     from quadcurv.kernels import jet as kernel
 
-    n = around.wanted.size
-
-    def run(d: int, r: int, at: Indices) -> Floats:
-        return around.polynomials(at, d, r, ghosts=False, kind=kernel.ROUND)
-
-    def spread(values: Floats) -> Floats:
-        """Means over neighbours, of noisy vertices alone."""
-        whole = np.full((n, values.shape[1]), np.nan)
-        whole[vertices] = values
-        return around.pooled(around.pooled(whole))[vertices]
-
-    high, low = run(6, 3, vertices), run(4, 3, vertices)
-    good6 = (high[:, kernel.CONDITION] <= _CONDITION[6]) & (high[:, kernel.FREEDOM] > 0)
-    good4 = low[:, kernel.CONDITION] <= _CONDITION[4]
+    high, low = (_round(around, d, 3, vertices) for d in (6, 4))
+    good6, good4 = (_sound(fits, d) for fits, d in ((high, 6), (low, 4)))
     explained = high[:, kernel.LOWER] - high[:, kernel.SQUARE]
     squares = np.stack((high[:, kernel.SQUARE], high[:, kernel.FREEDOM], explained), axis=1)
-    square, freedom, explained = spread(np.where(good6[:, None], squares, np.nan)).T
+    squares = np.where(good6[:, None], squares, np.nan)
+    square, freedom, explained = _spread(around, vertices, squares, 2).T
     noise2 = square / freedom
     gain6, gain4 = high[:, kernel.GAIN] ** 2, low[:, kernel.GAIN] ** 2
     bias2 = np.maximum(explained / 13 - (1 + _CHANCE) * noise2, 0.0) * np.maximum(gain6 - gain4, 0.0)
@@ -251,10 +249,87 @@ def _average(around: Neighbourhoods, vertices: Indices, found: _Found) -> None:
     found.put_noisy(vertices[take4], low[take4], 4, 3, np.sqrt(bias2[take4]))
     found.put_noisy(vertices[take6], high[take6], 6, 3, np.zeros(take6.sum()))
     todo = vertices[~take4 & ~take6]
-    for d, r in _WIDE[2:]:
+    for d, r in _MORE:
         if todo.size == 0:
             break
-        fits = run(d, r, todo)
-        good = (fits[:, kernel.CONDITION] <= _CONDITION[d]) & (fits[:, kernel.FREEDOM] > 0)
+        fits = _round(around, d, r, todo)
+        good = _sound(fits, d)
         found.put_noisy(todo[good], fits[good], d, r, np.zeros(good.sum()))
         todo = todo[~good]
+    if most > 3:
+        noise2 = np.where(np.isnan(noise2), _spread(around, vertices, noise2[:, None], 4)[:, 0], noise2)
+        wider = (found.degree[vertices] == 4) & (noise2 > 0)
+        _widen(around, vertices[wider], noise2[wider], found, 4, most)
+        simpler = _simplify(around, vertices[wider], noise2[wider], found)
+        _widen(around, vertices[wider][simpler], noise2[wider][simpler], found, 2, most)
+
+
+def _simplify(around: Neighbourhoods, vertices: Indices, noise2: Floats, found: _Found) -> Bools:
+    """Take quadratics over the same rings where they are not biased: at borders they have far less noise."""
+    from quadcurv.kernels import jet as kernel
+
+    before, rings = found.values[vertices], found.rings[vertices]
+    explained = (before[:, kernel.LOWER] - before[:, kernel.SQUARE]) / 9
+    excess = _spread(around, vertices, np.stack((explained, noise2), axis=1), 2) @ (1, -1 - _CHANCE)
+    fits = np.full_like(before, np.nan)
+    for r in np.unique(rings):
+        at = rings == r
+        fits[at] = _round(around, 2, int(r), vertices[at])
+    gain4, gain2 = before[:, kernel.GAIN] ** 2, fits[:, kernel.GAIN] ** 2
+    own = found.bias[vertices, 0]
+    bias2 = np.maximum(excess, 0.0) * np.maximum(gain4 - gain2, 0.0) + own**2
+    better = _sound(fits, 2) & (gain2 * noise2 + bias2 < gain4 * noise2 + own**2)
+    found.put_noisy(vertices[better], fits[better], 2, rings[better], np.sqrt(bias2[better]))
+    return better
+
+
+def _widen(
+    around: Neighbourhoods, vertices: Indices, noise2: Floats, found: _Found, degree: int, most: int
+) -> None:
+    """Take more rings as long as that lessens noise and bias together.
+
+    Of two such fits, one over some of the points of the other, H of the wider one is the best linear estimate
+    of all if it is not biased, and the difference between them has no part in its noise (Gauss and Markov).
+    What the mean square of the difference has beyond that of the noise is bias (Hausman 1978).
+    """
+    from quadcurv.kernels import jet as kernel
+
+    failed = np.zeros(vertices.size, bool)  # the step before
+    for r in (r for r in _RINGS if r <= most):
+        if vertices.size == 0:
+            return
+        fits, before = _round(around, degree, r, vertices), found.values[vertices]
+        good = _sound(fits, degree) & (found.rings[vertices] < r)
+        chance = (before[:, kernel.GAIN] ** 2 - fits[:, kernel.GAIN] ** 2) * noise2
+        both = np.stack(((fits[:, kernel.MEAN] - before[:, kernel.MEAN]) ** 2, chance), axis=1)
+        square, chance = _spread(around, vertices, np.where(good[:, None], both, np.nan), _POOL).T
+        own = found.bias[vertices, 0]
+        bias = np.sqrt(np.maximum(square - (1 + _PART) * chance, 0.0)) + own
+        risk = fits[:, kernel.GAIN] ** 2 * noise2 + bias**2
+        better = good & (risk < before[:, kernel.GAIN] ** 2 * noise2 + own**2)
+        known = np.hypot(np.sqrt(np.maximum(square - chance, 0.0)), own)
+        found.put_noisy(vertices[better], fits[better], degree, r, known[better])
+        kept = better | (found.rings[vertices] >= r) | (good & ~failed)
+        vertices, noise2, failed = vertices[kept], noise2[kept], (good & ~better)[kept]
+
+
+def _round(around: Neighbourhoods, d: int, r: int, at: Indices) -> Floats:
+    from quadcurv.kernels import jet as kernel
+
+    return around.polynomials(at, d, r, ghosts=False, kind=kernel.ROUND)
+
+
+def _sound(fits: Floats, d: int) -> Bools:
+    """Whether a fit is well conditioned, and has residuals."""
+    from quadcurv.kernels import jet as kernel
+
+    return (fits[:, kernel.CONDITION] <= _CONDITION[d]) & (fits[:, kernel.FREEDOM] > 0)
+
+
+def _spread(around: Neighbourhoods, vertices: Indices, values: Floats, rings: int) -> Floats:
+    """Means over neighbours among some vertices."""
+    whole = np.full((around.wanted.size, values.shape[1]), np.nan)
+    whole[vertices] = values
+    for _ in range(rings):
+        whole = around.pooled(whole)
+    return whole[vertices]

@@ -20,9 +20,6 @@ _GROWTH = 3
 _MOST_RINGS = 64
 
 _REFERENCE = "Cazals and Pouget 2005"
-_CANDIDATES = [(d, r) for d in (4, 3, 2) for r in range(2, 9)]
-_SAMPLE, _LEAST_SAMPLE = 3000, 100
-
 # Vertices (k,), degree, rings -> results (k, COLUMNS).
 Run = Callable[[Indices, int, int], Floats]
 
@@ -36,10 +33,9 @@ def jet(degree: int | Literal["auto"] | None = None, rings: int | None = None) -
         By default ("jet") chosen vertex by vertex, with rings and weights: where the surface is resolved a
         polynomial of degree 6 over three rings and over the nearest sphere instead of the plane, through the
         vertex and with weights that fall with the distance; where noise prevails plain least squares of
-        degree 4 or 6 over three rings; beside rough borders one-sided fits over more. "auto" chooses degree
-        and rings of plain fits for the whole mesh: those of the least error in the mean curvature as far as
-        the fits of a sample of vertices tell, noise by their standard errors and bias by differences between
-        fits.
+        degree 4 or 6 over three rings; beside rough borders one-sided fits over more. "auto" goes on where
+        noise prevails, over up to 11 rings, as long as that lessens noise and bias together, the one by its
+        residuals and the other by differences between fits, both averaged over neighbours.
     rings : int, optional
         Rings of faces around a vertex whose vertices are fitted, on a grid the window of
         (2 rings + 1)^2 points. By default 1 for degree 2, 3 for degree 6 and 2 for the others.
@@ -87,7 +83,7 @@ def jet(degree: int | Literal["auto"] | None = None, rings: int | None = None) -
     if degree == "auto":
         if rings is not None:
             raise ValueError(f'rings: chosen with degree "auto", got {rings!r}')
-        return Fit("jet-auto", 4, _REFERENCE, _chosen_curvatures)
+        return Fit("jet-auto", 6, _REFERENCE, lambda around: chosen(around, _MOST_RINGS))
     if not isinstance(degree, int) or degree not in _CONDITION:
         raise ValueError(f'degree: expected "auto" or one of {tuple(_CONDITION)}, got {degree!r}')
     if rings is None:
@@ -109,65 +105,6 @@ def _curvatures(around: Neighbourhoods, degree: int, rings: int) -> Curvatures:
         return around.polynomials(vertices, d, r, ghosts=r <= rings <= 2)
 
     return _unpacked(*_fits(around.wanted, run, degree, rings))
-
-
-def _chosen_curvatures(around: Neighbourhoods) -> Curvatures:
-    def run(vertices: Indices, d: int, r: int) -> Floats:
-        return around.polynomials(vertices, d, r, ghosts=False)
-
-    return _curvatures(around, *_choice(np.flatnonzero(around.present), run))
-
-
-def _choice(vertices: Indices, run: Run) -> tuple[int, int]:
-    """Degree and rings of the least expected error of H, by noise and bias, over a sample of vertices.
-
-    With H the mean curvature by a fit and H' that by a quartic over no more rings, H' - H is uncorrelated
-    with the noise of H, the best linear estimate of all (Gauss and Markov). Hence the mean of (H' - H)^2 is
-    var H' - var H and the square of how far the biases are apart (Hausman 1978). A quartic over one ring
-    more bears witness too, with var H' + var H at most. Cubics do not against quadratics: their H is of the
-    same order, and its bias often the larger one.
-    """
-    from quadcurv.kernels import jet as kernel
-
-    total = vertices.size
-    if total < _LEAST_SAMPLE:
-        return _CANDIDATES[0]
-    if total > _SAMPLE:
-        vertices = np.random.default_rng(0).choice(vertices, _SAMPLE, replace=False)
-    fits, sound = {}, {}
-    for d, r in _CANDIDATES:
-        fits[d, r], degrees, rings = _fits(
-            np.ones(vertices.size, bool), lambda at, d, r: run(vertices[at], d, r), d, r
-        )
-        sound[d, r] = (degrees == d) & (rings == r) & (fits[d, r][:, kernel.SIGMA] > 0)
-    # Those that most vertices have room for, at the vertices that have room for all of these.
-    fits = {c: f for c, f in fits.items() if sound[c].mean() > 0.5}
-    kept = np.all([sound[c] for c in fits], axis=0) if fits else np.zeros(0, bool)
-    if kept.sum() < _LEAST_SAMPLE:
-        return _CANDIDATES[0]
-    H = {c: f[kept, kernel.MEAN] for c, f in fits.items()}
-    gain2 = {c: f[kept, kernel.GAIN] ** 2 for c, f in fits.items()}
-    noise2 = np.mean(fits[next(iter(fits))][kept, kernel.SIGMA] ** 2)  # of the fewest rings
-
-    bias: dict[tuple[int, int], float] = {}
-    for c in fits:
-        bias[c] = 0.0
-        for b in [b for b in bias if b != c and b[0] == 4 and b[1] <= c[1] + 1]:
-            # One-sided fits, a tenth as precise, would drown what the others tell.
-            weights = 1 / gain2[b] / np.sum(1 / gain2[b])
-            shared = gain2[c] if b[1] <= c[1] else -gain2[c]
-            apart2 = weights @ ((H[b] - H[c]) ** 2 - noise2 * (gain2[b] - shared))
-            # What chance gives: fits nearer than their windows' width have their noise in common.
-            width = 2 * max(b[1], c[1]) + 1
-            chance = noise2 * (weights @ gain2[b]) * np.sqrt(2 / kept.sum() + width**2 / total)
-            bias[c] = max(bias[c], np.sqrt(max(apart2 - chance, 0.0)) - bias[b])
-
-    def risk(c: tuple[int, int]) -> float:
-        return float(
-            np.nanmean(np.hypot(fits[c][:, kernel.GAIN] * fits[c][:, kernel.SIGMA], bias[c]))
-        )  # one-sided ones too
-
-    return min(fits, key=risk)
 
 
 def _fits(wanted: Bools, run: Run, degree: int, rings: int) -> tuple[Floats, Ints, Ints]:
