@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy.spatial import ConvexHull
 from scipy.stats import spearmanr
 from test_jet import box, noisy, sampled
 
@@ -114,6 +115,18 @@ def test_coarse_ellipsoids(n, bound):
 def test_low_cylinders(shape, bound):
     grid, _, _ = surfaces.cylinder().sample(shape)
     assert np.abs(qc.mean_curvature(grid) - 0.5).max() < bound
+
+
+@pytest.mark.parametrize("n", [12, 20, 40])
+def test_nothing_is_undefined_on_random_points_of_a_sphere(n):
+    points = np.random.default_rng(1).normal(size=(n, 3))
+    points /= np.linalg.norm(points, axis=1, keepdims=True)
+    faces = ConvexHull(points).simplices
+    a, b, c = points[faces].swapaxes(0, 1)
+    inward = np.einsum("fx,fx->f", np.cross(b - a, c - a), a) < 0
+    faces[inward] = faces[inward, ::-1]
+    error, peer = (np.abs(qc.mean_curvature((points, faces), s) - 1) for s in ("jet", "cotan-6"))
+    assert error.mean() < peer.mean()
 
 
 # ---- creases, and jumps of curvature -------------------------------------------------------------------

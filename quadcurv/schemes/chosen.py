@@ -217,7 +217,33 @@ def _at_sides(around: Neighbourhoods, vertices: Indices, first: Floats, found: _
         good = here[:, kernel.CONDITION] <= _CONDITION[2]
         found.put(vertices[todo[good]], here[good], 2, r)
         todo = todo[~good]
+    if todo.size:
+        _spheres(around, vertices[todo], found)
     return vertices[noisy]
+
+
+def _spheres(around: Neighbourhoods, vertices: Indices, found: _Found) -> None:
+    """Take the sphere nearest to the ring where three or four neighbours determine nothing more."""
+    kernel = found.kernel
+    positions, normals = around.positions(vertices, 1)
+    apart = positions[:, 1:] - positions[:, :1]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        n = normals / np.linalg.norm(normals, axis=1, keepdims=True)
+        square = np.sum(apart**2, axis=2)
+        height = np.einsum("kmx,kx->km", apart, n)
+        H = -2 * np.nansum(height * square, axis=1) / np.nansum(square**2, axis=1)
+    known = np.isfinite(H) & ((square > 0).sum(axis=1) >= 3)
+    at, H, n = vertices[known], H[known], n[known]
+    # The axis least along the normal, less its part along it.
+    one = np.eye(3)[np.argmin(np.abs(n), axis=1)]
+    one -= np.einsum("kx,kx->k", one, n)[:, None] * n
+    one /= np.linalg.norm(one, axis=1, keepdims=True)
+    values = found.values
+    values[at, kernel.MEAN], values[at, kernel.GAUSSIAN] = H, H**2
+    values[at, kernel.K1], values[at, kernel.K2] = H, H
+    values[at, kernel.DIRECTION1], values[at, kernel.DIRECTION2] = one, np.cross(n, one)
+    values[at, kernel.NORMAL] = n
+    found.degree[at] = found.rings[at] = 1
 
 
 def _resolved(fits: Floats, d: int, rounding: float) -> Bools:
