@@ -124,8 +124,8 @@ class Curvatures:
     noise : float64 or None
         Standard deviation of the positions along the normal, from the residuals, in length.
     degree, rings : int32 or None
-        Degree and neighbourhood of the fit at each vertex, 0 where there is none, 1 for the sphere nearest to a
-        ring of too few vertices.
+        Degree and neighbourhood of the fit at each vertex, 0 where there is none, 1 for the sphere nearest
+        to a ring of too few vertices.
     feature : bool or None
         Vertices on creases: the surface has no curvature there, and what is given grows as the mesh is
         refined. Fits beside a crease look at their own side of it. Of "jet" alone.
