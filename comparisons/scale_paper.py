@@ -73,9 +73,9 @@ def section(setting: Setting) -> list[str]:
         f"Nothing of this was run: 10^12 vertices on {NODES} nodes of {CORES} cores, each node reading and "
         f"writing {RATE / 1e9:g} GB a second. Processor time a vertex was measured here, on {n} x {n} "
         f"vertices from file to file, faces in memory; a task's by {number} tasks that do nothing. Assumed "
-        "are cores as fast as these, none of which waits for memory or for another one; files that every node "
-        "reaches at its full rate; and tasks that share no more than the rows around them, 0.1 % of 64 "
-        "million vertices. Reading and writing then overlap with computing, and the largest row is what a run "
-        "takes."
+        "are cores as fast as these, none of which waits for memory or for another one; files that every "
+        "node reaches at its full rate; and tasks that share no more than the rows around them, 0.1 % of 64 "
+        "million vertices. Reading and writing then overlap with computing, and the largest row is what a "
+        "run takes."
     )
     return [text, "", *table(("what", "ns a vertex", "seconds"), rows)]

@@ -21,6 +21,7 @@ ORDER = (
     "eigenmodes",
     "mean_curvature_flow",
     "moving_grid",
+    "membrane_in_time",
     "other_programs",
     "pyvista_accessor",
     "trimesh_curvature",
