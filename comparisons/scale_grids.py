@@ -85,7 +85,7 @@ def through_dask(store: str, out: str, scheme: str, threads: int) -> dict[str, A
     _compiled(scheme)
     scale.begin()
     x = da.from_zarr(store)
-    lazy = qc.mean_curvature(qc.ChunkedGrid(x), scheme)
+    lazy: Any = qc.mean_curvature(qc.ChunkedGrid(x), scheme)
     into = zarr.create_array(
         store=out, shape=x.shape[:2], chunks=x.chunksize[:2], dtype="f8", compressors=None, overwrite=True
     )
@@ -135,7 +135,9 @@ def section(setting: Setting) -> list[str]:
     small = setting.quick
     sizes = (200, 400) if small else (1024, 2048, 4096, 8192, 16384)
     shown = sizes[-2:]
-    rows, growth, notes = [], [], []
+    rows: list[tuple[object, ...]] = []
+    growth: list[tuple[int, float]] = []
+    notes: list[str] = []
     for n in sizes:
         points, one, other = (setting.folder / name for name in (f"{n}.npy", "memory.npy", "slabs.npy"))
         write_points(points, n)

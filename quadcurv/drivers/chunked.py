@@ -39,7 +39,6 @@ from quadcurv.types import Floats, MeshError
 
 _MOST = 2**20  # vertices of a block
 _MOST_SMALL = 2**16  # where each takes much memory
-_DEPTH = 3  # rows along open sides that are not as inside
 # Windows whose results are cut from a larger one: what a side of the window that is none of the grid does to
 # rows near it, such as to be taken for a pole, must not be seen.
 MARGIN = 2
@@ -171,8 +170,8 @@ def holes_of(grid: ChunkedGrid) -> bool:
     return any(np.asarray(grid.mask[begin:end, :]).any() for begin, end in rows)
 
 
-def sides(grid: ChunkedGrid) -> Iterator[tuple[int, int, Cut, Cut]]:
-    """Open sides: axis, end, and what is read of rows and columns for results in the rows along it."""
+def sides(grid: ChunkedGrid, near: int) -> Iterator[tuple[int, int, Cut, Cut]]:
+    """Open sides: axis, end, and what is read of rows and columns for results in `near` rows along it."""
     if grid.has_ghosts:
         return
     for axis in (1, 0):
@@ -181,13 +180,12 @@ def sides(grid: ChunkedGrid) -> Iterator[tuple[int, int, Cut, Cut]]:
             continue
         whole = [Cut.around((0, n), n, w, 0) for n, w in zip(grid.shape, grid.wrap, strict=True)]
         for end in (0, -1):
-            rows, columns = _replaced(whole, axis, size, end)
+            rows, columns = _replaced(whole, axis, size, end, min(size, near))
             yield axis, end, rows, columns
 
 
-def _replaced(cuts: list[Cut], axis: int, size: int, end: int) -> list[Cut]:
+def _replaced(cuts: list[Cut], axis: int, size: int, end: int, near: int) -> list[Cut]:
     depth = min(size, 2 * BORDER)
-    near = min(size, _DEPTH)
     begin, first = (0, 0) if end == 0 else (size - depth, size - near)
     own = Cut(begin, begin + depth, first, first + near, size, False)
     if size <= 4 * BORDER:  # both sides
@@ -215,9 +213,11 @@ def _by_blocks(
 ) -> None:
     regions, size = [], None
     if not holes:
-        size = _size(grid)
         _check_seams(grid)
-        for _, _, rows, columns in sides(grid):
+    if task.scaled or (grid.roundoff > DOUBLE and not holes):
+        size = _size(grid)
+    if not holes:
+        for _, _, rows, columns in sides(grid, task.depth):
             window = opened(grid, rows, columns, arrays_of(grid, rows, columns), False, size)
             others = tuple(taken(f, rows.slices(), columns.slices()) for f in task.others)
             regions.append(region(task, window, boundary, others))
@@ -248,16 +248,19 @@ def _by_blocks(
                 forget(array, 0, a)
 
 
-def _size(grid: ChunkedGrid) -> float | None:
-    """Largest coordinate, by which positions in single precision are rounded; not looked at in double."""
-    if grid.roundoff <= DOUBLE:
-        return None
+def _size(grid: ChunkedGrid) -> float:
+    """Largest coordinate, by which positions are rounded."""
     most = 0.0
+    masked = grid.mask is not None and not isinstance(grid.mask, str)
     for array in (grid.points, grid.dual):
-        if array is not None:
-            for begin, end in ranges(array.shape[0], max(1, _MOST // array.shape[1])):
-                most = max(most, float(np.abs(array[begin:end, :]).max()))
-                forget(array, 0, end)
+        if array is None:
+            continue
+        for begin, end in ranges(array.shape[0], max(1, _MOST // array.shape[1])):
+            size = np.abs(array[begin:end, :])
+            if masked:
+                size[np.asarray(grid.mask[begin:end, :])] = 0
+            most = max(most, float(np.nanmax(size, initial=0.0)))
+            forget(array, 0, end)
     return most
 
 

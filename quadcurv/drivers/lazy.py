@@ -50,8 +50,8 @@ def _evaluate_one(grid: ChunkedGrid, task: Task, boundary: str) -> dict[str, Any
     compute = delayed(_block, pure=False)
 
     size = None
-    if grid.roundoff > DOUBLE and not holes:
-        size = da.absolute(grid.points).max()
+    if task.scaled or (grid.roundoff > DOUBLE and not holes):
+        size = da.nanmax(da.absolute(grid.points))
         if grid.dual is not None:
             size = da.maximum(size, da.absolute(grid.dual).max())
 
@@ -62,7 +62,7 @@ def _evaluate_one(grid: ChunkedGrid, task: Task, boundary: str) -> dict[str, Any
     strips = [
         ((rows.first, rows.last), (columns.first, columns.last),
          delayed(_side, pure=False)(facts, task, boundary, rows, columns, *inputs(rows, columns)))
-        for _, _, rows, columns in ([] if holes else sides(grid))
+        for _, _, rows, columns in ([] if holes else sides(grid, task.depth))
     ]  # fmt: skip
     cut = delayed(_shared, pure=False)
     blocks: dict[str, list[list[Any]]] = {name: [] for name in task.shapes}

@@ -11,7 +11,6 @@ from quadcurv.drivers import chunked, lazy, tasks
 from quadcurv.mesh import ChunkedGrid, QuadGrid
 from quadcurv.schemes import Curvatures, Fit, Scheme, StandardErrors
 
-_ERRORS = ("mean", "gaussian", "k1", "k2")
 _LARGE = 2**18  # vertices
 
 
@@ -46,16 +45,21 @@ def verb(grid: ChunkedGrid, name: str, scheme: Scheme | str, boundary: str) -> A
 
 def curvatures(grid: ChunkedGrid, scheme: Fit, boundary: str) -> Curvatures:
     """All that a fit knows."""
-    names = [name for name in tasks.FITTED if name != "mean_curvature_normal"]
+    left_out = (
+        {"mean_curvature_normal"} if scheme.pooled else {"mean_curvature_normal", "interval", "feature"}
+    )
+    names = [name for name in tasks.FITTED if name not in left_out]
     found = _run(grid, _task(scheme, names), boundary, look_at_rounding=True)
-    errors = found.pop("standard_error")
+    errors = {
+        name: StandardErrors(*(found.pop(name)[..., k] for k in range(len(StandardErrors._fields))))
+        for name in ("standard_error", "interval")
+        if name in found
+    }
+    whole = {name: found.pop(name).astype(np.int32) for name in ("degree", "rings")}
+    if "feature" in found:
+        whole["feature"] = found.pop("feature") > 0
     return Curvatures(
-        mean=found.pop("mean_curvature"),
-        gaussian=found.pop("gaussian_curvature"),
-        standard_error=StandardErrors(*(errors[..., k] for k in range(len(_ERRORS)))),
-        degree=found.pop("degree").astype(np.int32),
-        rings=found.pop("rings").astype(np.int32),
-        **found,
+        mean=found.pop("mean_curvature"), gaussian=found.pop("gaussian_curvature"), **found, **errors, **whole
     )
 
 

@@ -13,7 +13,7 @@ from quadcurv.drivers import DOUBLE, apply, compiled, direct, far_away, fits, ha
 from quadcurv.drivers.windows import Window
 from quadcurv.mesh import QuadGrid, StaggeredGrid
 from quadcurv.mesh.chunked import part
-from quadcurv.schemes import Curvatures, Diamond, Fit, Laplacian
+from quadcurv.schemes import Curvatures, Diamond, Fit, Laplacian, StandardErrors
 from quadcurv.schemes.angle_defect import gaussian_curvature
 from quadcurv.stencils import Frame
 from quadcurv.types import Floats
@@ -29,10 +29,12 @@ FITTED: dict[str, tuple[tuple[int, ...], Callable[[Curvatures], Any]]] = {
     "direction1": ((3,), lambda found: found.direction1),
     "direction2": ((3,), lambda found: found.direction2),
     "normal": ((3,), lambda found: found.normal),
-    "standard_error": ((4,), lambda found: np.stack(found.standard_error or (), axis=-1)),
+    "standard_error": ((4,), lambda found: _stacked(found.standard_error, found.mean)),
+    "interval": ((4,), lambda found: _stacked(found.interval, found.mean)),
     "noise": ((), lambda found: found.noise),
     "degree": ((), lambda found: found.degree),
     "rings": ((), lambda found: found.rings),
+    "feature": ((), lambda found: np.zeros(found.mean.shape) if found.feature is None else found.feature),
 }
 """What a fit gives by name, and the shape of one vertex's answer."""
 
@@ -54,6 +56,10 @@ class Task:
         Functions (r, c) or (r, c, k) that the task reads, too.
     small : bool
         Whether a vertex takes much memory and time, so that blocks are small.
+    depth : int
+        Rows along open sides whose answers rest on what is beyond the side.
+    scaled : bool
+        Whether the size of the whole grid's coordinates is asked for, even in double precision.
     """
 
     shapes: dict[str, tuple[int, ...]]
@@ -61,6 +67,8 @@ class Task:
     write: Callable[..., None]
     others: tuple[Any, ...] = ()
     small: bool = False
+    depth: int = 3
+    scaled: bool = False
 
 
 def laplacian(scheme: Laplacian, wanted: Iterable[str]) -> Task:
@@ -109,15 +117,18 @@ def fit(scheme: Fit, wanted: Iterable[str]) -> Task:
             return
         grid = window.grid
         around = fits.MeshNeighbourhoods(grid.to_mesh() if has_holes(grid) else grid, boundary or "nan")
-        block = np.zeros(grid.shape, bool)
-        block[window.inner] = True
-        around.wanted = around.wanted & grid.flat(block)
+        asked = np.zeros(grid.shape, bool)
+        asked[tuple(_wider(inner, scheme.pooled) for inner in window.inner)] = True
+        around.wanted = around.wanted & grid.flat(asked)
+        if window.size is not None:
+            around.rounding = fits.ROUNDING * window.size
         found = fits.fit_around(around, scheme)
         if has_holes(grid):
             found = fits.each(found, grid.in_shape)
         _put(window, {name: FITTED[name][1](found) for name in names}, into)
 
-    return Task({name: FITTED[name][0] for name in names}, scheme.reach, write, small=True)
+    shapes = {name: FITTED[name][0] for name in names}
+    return Task(shapes, scheme.reach, write, small=True, depth=3 + scheme.pooled, scaled=True)
 
 
 def angle_defect() -> Task:
@@ -154,6 +165,10 @@ def laplace_beltrami(scheme: Laplacian, f: Any) -> Task:
     return Task({"laplace_beltrami": more}, 1, write, (f,), small=True)
 
 
+def _stacked(errors: StandardErrors | None, like: Floats) -> Floats:
+    return np.full((*like.shape, 4), np.nan) if errors is None else np.stack(errors, axis=-1)
+
+
 def with_holes(task: Task) -> Task:
     """The same where vertices may be at the border of a hole, on whose depth their answers rest."""
     return replace(task, reach=task.reach + BORDER, small=True)
@@ -161,6 +176,10 @@ def with_holes(task: Task) -> Task:
 
 BORDER = 16
 """Rows inward from the border, or along it, that what closes a ring there rests on at most."""
+
+
+def _wider(inner: slice, rings: int) -> slice:
+    return slice(max(inner.start - rings, 0), inner.stop + rings)
 
 
 def _has_quads(grid: QuadGrid | StaggeredGrid) -> bool:
@@ -176,7 +195,7 @@ def _put(window: Window, found: Mapping[str, Any], into: Into) -> None:
     for name, array in into.items():
         if name in found:
             array[...] = found[name][window.inner]
-        elif name in ("degree", "rings"):
+        elif name in ("degree", "rings", "feature"):
             array[...] = 0
         else:
             array[...] = np.nan

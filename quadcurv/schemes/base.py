@@ -274,6 +274,8 @@ class Fit:
         outer one.
     reach : int or None
         Rings of faces that a result rests on at most; None where all of the mesh decides.
+    pooled : int
+        Rings over which results of neighbours are looked at.
 
     Examples
     --------
@@ -287,6 +289,7 @@ class Fit:
     reference: str
     fit: Callable[[Neighbourhoods], Curvatures]
     reach: int | None = None
+    pooled: int = 0
 
 
 Scheme = Laplacian | Fit

@@ -39,7 +39,10 @@ _QUANTILE = 0.975
 _SMALLER = ((4, 2), (2, 1))
 _DOUBT = 0.02  # of the curvature, from which errors on others are asked
 _NEARLY_ALL = 0.8
-_FAR = 40  # rings over which noise is looked for at most, where all is steep
+_FAR = 12  # rings over which noise is looked for at most, where all is steep
+POOLED = _FAR
+# Fits over five rings at these, the normals of the rings, and how far creases and jumps are looked for.
+REACH = POOLED + 5 + 1 + 6
 
 
 class _Found:
@@ -162,14 +165,16 @@ def _in_noise(around: Neighbourhoods, vertices: Indices, steep: Indices, noisy: 
     evidence = np.full(around.wanted.size, np.nan)
     evidence[vertices] = 0.0
     evidence[steep], evidence[noisy] = np.nan, 1.0
-    chosen = np.zeros(evidence.size, bool)
+    chosen, nearest = np.zeros(evidence.size, bool), np.full(evidence.size, np.nan)
     for rings in range(1, _FAR + 1):
         evidence = around.pooled(evidence[:, None])[:, 0]
         if rings == 2:
             chosen[vertices] = evidence[vertices] > _NEARLY_ALL
-        if rings > 2 and np.isfinite(evidence[steep]).all():
-            break
-    chosen[steep] |= evidence[steep] > 0.5
+        if rings > 2:  # what is nearest counts, however far others have to look
+            nearest = np.where(np.isnan(nearest), evidence, nearest)
+            if np.isfinite(nearest[steep]).all():
+                break
+    chosen[steep] |= nearest[steep] > 0.5
     return np.flatnonzero(chosen)
 
 

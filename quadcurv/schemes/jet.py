@@ -8,7 +8,7 @@ from typing import Literal
 import numpy as np
 
 from quadcurv.schemes.base import Curvatures, Fit, Neighbourhoods, StandardErrors
-from quadcurv.schemes.chosen import chosen
+from quadcurv.schemes.chosen import POOLED, REACH, chosen
 from quadcurv.types import Bools, Floats, Indices, Ints
 
 # Most that errors in height, of unit mean square, may grow to in the second derivatives, both in units of
@@ -79,7 +79,7 @@ def jet(degree: int | Literal["auto"] | None = None, rings: int | None = None) -
     if degree is None:
         if rings is not None:
             raise ValueError(f"rings: chosen vertex by vertex without a degree, got {rings!r}")
-        return Fit("jet", 6, _REFERENCE, chosen)
+        return Fit("jet", 6, _REFERENCE, chosen, REACH, POOLED)
     if degree == "auto":
         if rings is not None:
             raise ValueError(f'rings: chosen with degree "auto", got {rings!r}')
