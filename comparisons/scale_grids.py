@@ -69,7 +69,7 @@ def zarr_in_slabs(store: str, out: str, scheme: str) -> None:
 
     _compiled(scheme)
     scale.begin()
-    x = zarr.open(store, mode="r")
+    x: Any = zarr.open(store, mode="r")
     into = zarr.create_array(
         store=out, shape=x.shape[:2], chunks=x.chunks[:2], dtype="f8", compressors=None, overwrite=True
     )
@@ -86,7 +86,7 @@ def through_dask(store: str, out: str, scheme: str, threads: int) -> dict[str, A
     scale.begin()
     x = da.from_zarr(store)
     lazy: Any = qc.mean_curvature(qc.ChunkedGrid(x), scheme)
-    into = zarr.create_array(
+    into: Any = zarr.create_array(
         store=out, shape=x.shape[:2], chunks=x.chunksize[:2], dtype="f8", compressors=None, overwrite=True
     )
     with dask.config.set(scheduler="threads", num_workers=threads):

@@ -50,17 +50,15 @@ def curvatures(grid: ChunkedGrid, scheme: Fit, boundary: str) -> Curvatures:
     )
     names = [name for name in tasks.FITTED if name not in left_out]
     found = _run(grid, _task(scheme, names), boundary, look_at_rounding=True)
-    errors = {
-        name: StandardErrors(*(found.pop(name)[..., k] for k in range(len(StandardErrors._fields))))
-        for name in ("standard_error", "interval")
-        if name in found
-    }
-    whole = {name: found.pop(name).astype(np.int32) for name in ("degree", "rings")}
+    arrays: dict[str, Any] = dict(found)
+    for name in ("standard_error", "interval"):
+        if name in found:
+            arrays[name] = StandardErrors(*(found[name][..., k] for k in range(4)))
+    for name in ("degree", "rings"):
+        arrays[name] = found[name].astype(np.int32)
     if "feature" in found:
-        whole["feature"] = found.pop("feature") > 0
-    return Curvatures(
-        mean=found.pop("mean_curvature"), gaussian=found.pop("gaussian_curvature"), **found, **errors, **whole
-    )
+        arrays["feature"] = found["feature"] > 0
+    return Curvatures(arrays.pop("mean_curvature"), arrays.pop("gaussian_curvature"), **arrays)
 
 
 def principal_curvatures(grid: ChunkedGrid, scheme: Fit, boundary: str) -> tuple[Any, ...]:
