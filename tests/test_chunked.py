@@ -128,7 +128,8 @@ def test_creases_are_found_in_blocks(monkeypatch):
     assert whole.feature.sum() == 41
     assert equal(whole.feature, blocks.feature)
     assert equal(whole.degree, blocks.degree)
-    np.testing.assert_allclose(whole.mean, blocks.mean, rtol=0, atol=1e-9)
+    # With a crease anywhere the grid in memory is fitted as a face list, a block without one by windows.
+    np.testing.assert_allclose(whole.mean, blocks.mean, rtol=0, atol=1e-7)
 
 
 def test_other_fits_of_other_reach(small):
