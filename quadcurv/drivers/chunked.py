@@ -170,8 +170,8 @@ def holes_of(grid: ChunkedGrid) -> bool:
     return any(np.asarray(grid.mask[begin:end, :]).any() for begin, end in rows)
 
 
-def sides(grid: ChunkedGrid, near: int) -> Iterator[tuple[int, int, Cut, Cut]]:
-    """Open sides: axis, end, and what is read of rows and columns for results in `near` rows along it."""
+def sides(grid: ChunkedGrid, task: Task) -> Iterator[tuple[int, int, Cut, Cut]]:
+    """Open sides: axis, end, and what is read of rows and columns for results in the rows along it."""
     if grid.has_ghosts:
         return
     for axis in (1, 0):
@@ -180,15 +180,16 @@ def sides(grid: ChunkedGrid, near: int) -> Iterator[tuple[int, int, Cut, Cut]]:
             continue
         whole = [Cut.around((0, n), n, w, 0) for n, w in zip(grid.shape, grid.wrap, strict=True)]
         for end in (0, -1):
-            rows, columns = _replaced(whole, axis, size, end, min(size, near))
+            rows, columns = _replaced(whole, axis, size, end, task)
             yield axis, end, rows, columns
 
 
-def _replaced(cuts: list[Cut], axis: int, size: int, end: int, near: int) -> list[Cut]:
-    depth = min(size, 2 * BORDER)
+def _replaced(cuts: list[Cut], axis: int, size: int, end: int, task: Task) -> list[Cut]:
+    near = min(size, task.depth)
+    depth = min(size, max(2 * BORDER, task.depth + task.reach + MARGIN))
     begin, first = (0, 0) if end == 0 else (size - depth, size - near)
     own = Cut(begin, begin + depth, first, first + near, size, False)
-    if size <= 4 * BORDER:  # both sides
+    if size <= 2 * depth:  # both sides
         own = own._replace(begin=0, end=size)
     return [own if i == axis else cut for i, cut in enumerate(cuts)]
 
@@ -217,7 +218,7 @@ def _by_blocks(
     if task.scaled or (grid.roundoff > DOUBLE and not holes):
         size = _size(grid)
     if not holes:
-        for _, _, rows, columns in sides(grid, task.depth):
+        for _, _, rows, columns in sides(grid, task):
             window = opened(grid, rows, columns, arrays_of(grid, rows, columns), False, size)
             others = tuple(taken(f, rows.slices(), columns.slices()) for f in task.others)
             regions.append(region(task, window, boundary, others))

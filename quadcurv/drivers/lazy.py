@@ -62,7 +62,7 @@ def _evaluate_one(grid: ChunkedGrid, task: Task, boundary: str) -> dict[str, Any
     strips = [
         ((rows.first, rows.last), (columns.first, columns.last),
          delayed(_side, pure=False)(facts, task, boundary, rows, columns, *inputs(rows, columns)))
-        for _, _, rows, columns in ([] if holes else sides(grid, task.depth))
+        for _, _, rows, columns in ([] if holes else sides(grid, task))
     ]  # fmt: skip
     cut = delayed(_shared, pure=False)
     blocks: dict[str, list[list[Any]]] = {name: [] for name in task.shapes}
