@@ -9,6 +9,7 @@ from scipy.stats import spearmanr
 from test_jet import box, noisy, sampled
 
 import quadcurv as qc
+from comparisons import accuracy, cases
 from quadcurv import surfaces
 from quadcurv.drivers.fits import MeshNeighbourhoods
 from quadcurv.estimate import disagreement
@@ -237,3 +238,18 @@ def test_more_rings_where_noise_prevails(noise, bound):
     assert error.mean() < bound
     assert np.mean(error <= found.interval.mean) > 0.92
     assert np.unique(found.rings).size > 2
+
+
+@pytest.mark.parametrize("valence", [3, 5, 6, 8])
+def test_kinks_of_lines_are_no_features(valence):
+    """Where the sectors around an extraordinary vertex meet lines bend, and the surface does not."""
+    errors = []
+    for n in (16, 32, 64):
+        case = cases.fan(valence, n)
+        found = qc.curvatures(case.mesh)
+        assert not found.feature.any()
+        near = accuracy.near_extraordinary(case.mesh, valence)
+        assert (found.degree[near] == 6).all()
+        errors.append(np.abs(found.mean - case.H)[near].max())
+    assert errors[-1] < 2e-8
+    assert fitted_rate((16, 32, 64), errors) > 4.5

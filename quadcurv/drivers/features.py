@@ -14,6 +14,10 @@ _LEAST, _TIMES = np.radians(4.0), 4.0
 # Least step of curvature at a jump: times those beside it, as a share of the curvature, and as an angle.
 _STEP, _SHARE, _TURN = 10.0, 0.5, 1e-3
 _MILD = np.radians(45.0)  # most that a tangent turns there
+# Where a strip turns it meets another of the surface's curvatures: a change by at most so many times the
+# largest one around and the sine of its kink (2 of all directions, of which strips show two); from so large
+# kinks on nothing is told.
+_TURNED, _KINK = 3.0, np.sin(np.radians(15.0))
 _LENGTH = 2  # edges at least, to both sides of an edge, that a crease goes on for
 
 
@@ -59,7 +63,34 @@ def features(stencils: Stencils) -> Features:
     between = np.abs(2 * own - near[0] - far[0]) <= step
     largest = np.maximum(_SHARE * np.maximum(np.abs(near[0]), np.abs(far[0])), _TURN / length)
     jumps = np.flatnonzero((step > _STEP * calm) & (step > largest) & between & (turn <= _MILD))
+    sides = (f[jumps], i[jumps]), (g[jumps], j[jumps])
+    kink = np.max([_kinks(stencils, other, *side) for side in (sides[0], *map(_opposite, sides))], axis=0)
+    known = np.fmax(*(np.nanmax(np.abs(angle[side[0]]), axis=1, initial=0.0) for side in sides))
+    jumps = jumps[(kink < _KINK) & (step[jumps] > _TURNED * kink * known)]
     return Features(_along(stencils, f[sharp], i[sharp]), _along(stencils, f[jumps], i[jumps]))
+
+
+def _opposite(side: tuple[Indices, Indices]) -> tuple[Indices, Indices]:
+    """The next edges of strips, as the same quads have them."""
+    return side[0], (side[1] + 2) % 4
+
+
+def _kinks(stencils: Stencils, other: Indices, f: Indices, i: Indices) -> Floats:
+    """Sines of how far strips of quads change their direction at edges, where they meet another curvature."""
+    g, j = other[f, i].T
+    turn = _slants(stencils, f, i) - _slants(stencils, g, j)
+    return np.where((g >= 0) & np.isfinite(turn), np.abs(np.sin(turn)), 0.0)
+
+
+def _slants(stencils: Stencils, f: Indices, i: Indices) -> Floats:
+    """Angles between edges of quads and the way from there to the opposite ones."""
+    corners = stencils.faces[f[:, None], (i[:, None] + np.arange(4)) % 4]
+    a, b, c, d = np.moveaxis(stencils.points[corners], 1, 0)
+    edge, way = b - a, (c + d - a - b) / 2
+    with np.errstate(divide="ignore", invalid="ignore"):
+        cosine = np.einsum("ex,ex->e", edge, way)
+        cosine = cosine / (np.linalg.norm(edge, axis=1) * np.linalg.norm(way, axis=1))
+    return np.arccos(np.clip(cosine, -1.0, 1.0))
 
 
 def _along(stencils: Stencils, f: Indices, i: Indices) -> Bools:
