@@ -49,8 +49,12 @@ ROOMS = (4 * ROW, ROW + Y, 18 * S, 3 * S)  # planes, part, work, and where vecto
 
 
 def rooms(sizes):
-    """Scratch for one call of a pass, each array at the beginning of a page."""
-    room = np.empty(sum(size + PAGE for size in sizes) + PAGE)
+    """Scratch for one call of a pass, each array at the beginning of a page.
+
+    Stretches are computed whole, beyond the last column too: what lay in the memory before may be numbers so
+    small that a processor takes a hundred times as long for each.
+    """
+    room = np.zeros(sum(size + PAGE for size in sizes) + PAGE)
     at = -(room.__array_interface__["data"][0] // 8) % PAGE
     found = []
     for size in sizes:
