@@ -222,9 +222,10 @@ def test_sizes_far_from_one(scheme, size):
     """The square of u x v is that of an area: the fourth power of a length."""
     points = rough((12, 14))
     H = qc.mean_curvature(QuadGrid(points), scheme)
+    assert np.isfinite(H[1:-1, 1:-1]).all()  # the border is too rough for a surface
     for mesh in (QuadGrid(size * points), QuadGrid(size * points).to_mesh()):
         scaled = qc.mean_curvature(mesh, scheme).reshape(H.shape)
-        np.testing.assert_allclose(scaled * size, H, rtol=0, atol=1e-12 * np.abs(H).max())
+        np.testing.assert_allclose(scaled * size, H, rtol=0, atol=1e-12 * np.nanmax(np.abs(H)))
 
 
 @pytest.mark.parametrize("threads", [1, 2])
@@ -392,7 +393,7 @@ def large_and_serial():
     qc.set_threads(2)
     two = qc.mean_curvature(grid, "finite_volume")
     qc.set_threads(1)
-    return bool(np.array_equal(two, qc.mean_curvature(grid, "finite_volume")))
+    return bool(np.array_equal(two, qc.mean_curvature(grid, "finite_volume"), equal_nan=True))
 
 
 @pytest.mark.filterwarnings("ignore:.*use of fork:DeprecationWarning")
