@@ -34,9 +34,7 @@ found
 # %%
 all_of_it = qc.curvatures(scan, "jet-auto")
 print(f"noise {np.median(all_of_it.noise):.4f}, as put in {noise:.4f}")
-print(
-    "rings", np.unique(all_of_it.rings), f"interval of H ± {np.median(all_of_it.interval.mean):.3f}"
-)
+print("rings", np.unique(all_of_it.rings), f"interval of H ± {np.median(all_of_it.interval.mean):.3f}")
 
 
 # %%
