@@ -350,6 +350,17 @@ def test_powers_of_two_change_no_digit(power, scheme):
     assert np.array_equal(scaled, qc.mean_curvature((points, faces), scheme), equal_nan=True)
 
 
+@pytest.mark.parametrize("power", [-200, 200])
+@pytest.mark.parametrize("scheme", ["jet", "jet-2", "jet-auto"])
+def test_powers_of_two_change_no_digit_of_error_bars(scheme, power):
+    points, faces = bowl(9, 9)
+    one, other = (qc.curvatures((f * points, faces), scheme) for f in (1.0, 2.0**power))
+    for bars, scaled in ((one.standard_error, other.standard_error), (one.interval, other.interval)):
+        for name in bars._fields if bars is not None else ():
+            factor = 2.0 ** (power * (2 if name == "gaussian" else 1))
+            assert np.array_equal(factor * getattr(scaled, name), getattr(bars, name), equal_nan=True)
+
+
 @every_scheme
 def test_an_offset_costs_nothing_but_the_digits_of_the_positions(scheme):
     """Positions that an offset of a million leaves as they are: results stay, ghosts too."""

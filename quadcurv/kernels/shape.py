@@ -55,7 +55,9 @@ def curvatures(B, constant, xx, yx, yy, bend, frame, S):
         second.append(cos * f2 - sin * f1)
         normal.append((n - p * t1 - q * t2) / W)
 
-    # Standard errors to first order; those of the slopes are of a higher one.
+    # Standard errors to first order; those of the slopes are of a higher one. The squares are of numbers
+    # without al^2: with it, those of the smallest meshes overflow, and those of the largest ones vanish.
+    shear, stretch = -yx / yy, xx / yy
     errors = []
     for da, db, dc in (
         (0.5, 0.0, 0.5),
@@ -66,10 +68,10 @@ def curvatures(B, constant, xx, yx, yy, bend, frame, S):
         dxx = -da / (e2 * W) + db * p * q / (e2 * W * W) - dc * p * p * q * q / (e2 * W * W * W)
         dxy = -db / (W * W) + dc * 2 * p * q / (W * W * W)
         dyy = -dc * e2 / (W * W * W)
-        u = 2 * al * al * dxx
-        v = 2 * al * be * dxx + ga * al * dxy
-        w = 2 * be * be * dxx + 2 * ga * be * dxy + 2 * ga * ga * dyy
+        u = 2 * dxx
+        v = 2 * shear * dxx + stretch * dxy
+        w = 2 * shear * shear * dxx + 2 * stretch * shear * dxy + 2 * stretch * stretch * dyy
         square = u * u * S[0] + v * v * S[2] + w * w * S[5]
         square += 2 * (u * v * S[1] + u * w * S[3] + v * w * S[4])
-        errors.append(root(where(square < 0, 0.0, square)))
+        errors.append(al * al * root(where(square < 0, 0.0, square)))
     return (H, a * c - b * b, H + size, H - size, *first, *second, *normal), errors
