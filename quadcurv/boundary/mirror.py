@@ -30,7 +30,9 @@ def mirrored(stencils: Stencils, surfaces: Surfaces, rings: int) -> Floats:
     opposite = np.linalg.norm(x[:, :, None] + x[:, None], axis=3)  # from the mirror image of one to another
     with np.errstate(invalid="ignore"):
         free = inside & (np.nanmin(opposite, axis=2, initial=np.inf) > _FREE * spacing[:, None])
-    ghosts = np.where(free[..., None], surfaces.lifted(np.where(free[..., None], -x, 0.0)), np.nan)
+    ghosts = surfaces.lifted(np.where(free[..., None], -x, 0.0))
+    free &= np.isfinite(ghosts).all(axis=2)
+    ghosts = np.where(free[..., None], ghosts, np.nan)
     both = np.concatenate((points, ghosts), axis=1)
     # Those there are first.
     order = np.argsort(np.isnan(both[..., 0]), axis=1, kind="stable")

@@ -67,9 +67,10 @@ class Surfaces(NamedTuple):
         return np.einsum("kax,kjx->kja", self.frames[:, :2], positions - self.points[:, None])
 
     def lifted(self, x: Floats) -> Floats:
-        """Points (k, j, 3) of the surfaces over tangent coordinates (k, j, 2)."""
-        terms = _terms(np.einsum("kab,kjb->kja", self.maps, x), RINGS)
-        z = np.einsum("kjt,kt->kj", terms, self.coefficients)
+        """Points (k, j, 3) of the surfaces over tangent coordinates (k, j, 2), not finite where too far."""
+        with np.errstate(over="ignore", invalid="ignore"):
+            terms = _terms(np.einsum("kab,kjb->kja", self.maps, x), RINGS)
+            z = np.einsum("kjt,kt->kj", terms, self.coefficients)
         local = np.concatenate((x, z[..., None]), axis=2)
         return np.einsum("kax,kja->kjx", self.frames, local) + self.points[:, None]
 

@@ -28,6 +28,7 @@ class Features(NamedTuple):
     jumps: Bools
 
 
+@np.errstate(divide="ignore", invalid="ignore", over="ignore")  # where points coincide nothing is known
 def features(stencils: Stencils) -> Features:
     """Find creases and jumps of curvature along the edges of a mesh.
 
@@ -53,8 +54,7 @@ def features(stencils: Stencils) -> Features:
     # Curvature across every edge, by face and slot, and the edge that the other face has it as.
     bend = np.einsum("ex,ex->e", normals[g] - normals[f], apart)  # twisted faces turn, too
     length = np.linalg.norm(apart, axis=1)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        angle[f, i] = angle[g, j] = bend / length**2
+    angle[f, i] = angle[g, j] = bend / length**2
     other = np.full((*faces.shape, 2), -1)
     other[f, i], other[g, j] = np.stack((g, j), axis=1), np.stack((f, i), axis=1)
     near, far = (_following(faces, angle, other, *side) for side in ((f, i), (g, j)))
@@ -87,9 +87,8 @@ def _slants(stencils: Stencils, f: Indices, i: Indices) -> Floats:
     corners = stencils.faces[f[:, None], (i[:, None] + np.arange(4)) % 4]
     a, b, c, d = np.moveaxis(stencils.points[corners], 1, 0)
     edge, way = b - a, (c + d - a - b) / 2
-    with np.errstate(divide="ignore", invalid="ignore"):
-        cosine = np.einsum("ex,ex->e", edge, way)
-        cosine = cosine / (np.linalg.norm(edge, axis=1) * np.linalg.norm(way, axis=1))
+    cosine = np.einsum("ex,ex->e", edge, way)
+    cosine = cosine / (np.linalg.norm(edge, axis=1) * np.linalg.norm(way, axis=1))
     return np.arccos(np.clip(cosine, -1.0, 1.0))
 
 
@@ -126,8 +125,7 @@ def _planes(stencils: Stencils) -> tuple[Floats, Floats]:
     normal = np.cross(c - a, d - b)
     triangle = (faces[:, 3] < 0)[:, None]
     centres = np.where(triangle, (a + b + c) / 3, (a + b + c + d) / 4)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        return normal / np.linalg.norm(normal, axis=1, keepdims=True), centres
+    return normal / np.linalg.norm(normal, axis=1, keepdims=True), centres
 
 
 def _beside(faces: Ints, angle: Floats, f: Indices, i: Indices) -> Floats:
