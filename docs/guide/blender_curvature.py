@@ -29,6 +29,4 @@ attribute.layer_name = "curvature"
 material.node_tree.links.new(attribute.outputs["Color"], nodes["Principled BSDF"].inputs["Base Color"])
 mesh.materials.append(material)
 bpy.ops.wm.save_as_mainfile(filepath=blend)
-print(
-    f"{len(mesh.polygons)} faces, {len(mesh.vertices)} vertices, H from {np.nanmin(H):.4g} to {np.nanmax(H):.4g}"
-)
+print(f"{len(mesh.polygons)} faces, H from {np.nanmin(H):.4g} to {np.nanmax(H):.4g}")
