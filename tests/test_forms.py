@@ -8,7 +8,7 @@ import pytest
 import quadcurv as qc
 from quadcurv import surfaces
 from quadcurv.refinement import fitted_rate
-from quadcurv.schemes import SCHEMES, fundamental_forms
+from quadcurv.schemes import SCHEMES, fundamental_forms, jet
 
 SURFACES = ["torus", "ellipsoid", "tanh_sheet", "catenoid", "helicoid", "hyperboloid"]
 
@@ -78,7 +78,7 @@ def test_fourth_order_agrees_with_the_jet_to_its_error():
     for n in (64, 128, 256):
         grid = surfaces.tanh_sheet().sample((n, n))[0]
         differences.append(
-            np.abs(qc.mean_curvature(grid, fundamental_forms(4)) - qc.mean_curvature(grid, "jet")).max()
+            np.abs(qc.mean_curvature(grid, fundamental_forms(4)) - qc.mean_curvature(grid, jet(4))).max()
         )
     assert differences[-1] < 1e-6
     assert fitted_rate((64, 128, 256), differences) > 3.7

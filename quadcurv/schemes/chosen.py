@@ -237,7 +237,7 @@ def _spheres(around: Neighbourhoods, vertices: Indices, found: _Found) -> None:
         square = np.sum(apart**2, axis=2)
         height = np.einsum("kmx,kx->km", apart, n)
         H = -2 * np.nansum(height * square, axis=1) / np.nansum(square**2, axis=1)
-    known = np.isfinite(H) & ((square > 0).sum(axis=1) >= 3)
+    known = np.isfinite(H) & np.isfinite(n).all(axis=1) & ((square > 0).sum(axis=1) >= 3)
     at, H, n = vertices[known], H[known], n[known]
     # The axis least along the normal, less its part along it.
     one = np.eye(3)[np.argmin(np.abs(n), axis=1)]
