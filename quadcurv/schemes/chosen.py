@@ -23,6 +23,9 @@ _LAST = (1, 2, 3, 4)  # rings of quadratic fits
 # Most that errors in height, of unit mean square, may grow to in the second derivatives, both in units of
 # the neighbourhood's extent; regular neighbourhoods have 40, 16 and 4.
 _CONDITION = {6: 500.0, 4: 160.0, 2: 40.0}
+# The same of plain least squares: regular neighbourhoods have 30 to 40, those without two rows 400 to 600, of
+# which nothing is left but noise.
+_PLAIN = {6: 160.0, 4: 160.0, 2: 40.0}
 # The same of one-sided fits; over fewer rows than one more than the degree what they leave out is not seen.
 _ONE_SIDED = {(6, 3): 2e3, (6, 4): 2e3, (6, 5): 1e4, (4, 2): 1e3, (4, 3): 1e3, (4, 4): 1e3}
 # What noise leaves of its square in weighted residuals, and their degrees of freedom, both per point more
@@ -354,7 +357,7 @@ def _sound(fits: Floats, d: int) -> Bools:
     """Whether a fit is well conditioned, and has residuals."""
     from quadcurv.kernels import jet as kernel
 
-    return (fits[:, kernel.CONDITION] <= _CONDITION[d]) & (fits[:, kernel.FREEDOM] > 0)
+    return (fits[:, kernel.CONDITION] <= _PLAIN[d]) & (fits[:, kernel.FREEDOM] > 0)
 
 
 def _spread(around: Neighbourhoods, vertices: Indices, values: Floats, rings: int) -> Floats:
