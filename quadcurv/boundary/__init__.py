@@ -30,7 +30,7 @@ from quadcurv.boundary.poles import closed_grid, parts_at_poles, poles, welded
 from quadcurv.boundary.sides import frame, ghost_layer, part_around
 from quadcurv.boundary.strips import ghosts
 from quadcurv.boundary.strips import roughness as rough_lines
-from quadcurv.boundary.surface import fitted
+from quadcurv.boundary.surface import Surfaces, fitted
 from quadcurv.mesh import Mesh, QuadGrid, StaggeredGrid
 from quadcurv.stencils import Stencils
 from quadcurv.types import Floats
@@ -42,6 +42,7 @@ __all__ = [
     "INTERIOR",
     "OPEN",
     "REACH",
+    "Surfaces",
     "boundary_treatment",
     "cell_ghosts",
     "cells_at_poles",

@@ -17,6 +17,7 @@ import scipy
 
 from quadcurv.boundary import (
     REACH,
+    Surfaces,
     checked_boundary,
     fitted,
     ghost_layer,
@@ -214,7 +215,10 @@ class MeshNeighbourhoods:
 
     def _mirrored(self, vertices: Indices, rings: int, inside: bool = False) -> list[_Beyond]:
         """Neighbourhoods completed by points of fitted surfaces, as stencils that lead to these points."""
-        surfaces = fitted(self.stencils, vertices)
+        key = vertices.tobytes()
+        if key not in self._surfaces:  # the same for every number of rings
+            self._surfaces[key] = fitted(self.stencils, vertices)
+        surfaces = self._surfaces[key]
         rows = np.flatnonzero(np.isfinite(surfaces.error))
         if rows.size == 0:
             return []
@@ -227,6 +231,10 @@ class MeshNeighbourhoods:
         place[vertices] = np.arange(vertices.size)
         faces = _FaceNeighbourhoods(_bundles(points), surfaces.frames[:, 2])
         return [_Beyond(faces, place, 1, error if inside else None)]
+
+    @cached_property
+    def _surfaces(self) -> dict[bytes, Surfaces]:
+        return {}
 
     @cached_property
     def _replaced(self) -> dict[int, list[_Beyond]]:
