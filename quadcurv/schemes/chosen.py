@@ -210,7 +210,8 @@ def _at_sides(around: Neighbourhoods, vertices: Indices, first: Floats, found: _
         whole = np.full((n, 1), np.nan)
         whole[vertices[at], 0] = own
         error = np.full(vertices.size, np.inf)
-        error[at] = around.pooled(whole)[vertices[at], 0]
+        # Neighbours tell more than one vertex, but those on the border itself may be worse off.
+        error[at] = np.minimum(own, around.pooled(whole)[vertices[at], 0])
         fits.append(here)
         errors.append(error)
     best = np.argmin(errors, axis=0)
