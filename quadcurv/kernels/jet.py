@@ -36,7 +36,7 @@ RIM = 1.44
 MEAN, GAUSSIAN, K1, K2 = 0, 1, 2, 3
 DIRECTION1, DIRECTION2, NORMAL = slice(4, 7), slice(7, 10), slice(10, 13)
 # GAIN, BIAS: four of them.
-SIGMA, GAIN, CONDITION, BIAS, SQUARE, FREEDOM, LOWER, COLUMNS = 13, 14, 18, 19, 23, 24, 25, 26
+SIGMA, GAIN, CONDITION, BIAS, SQUARE, FREEDOM, LOWER, WHOLE, COLUMNS = 13, 14, 18, 19, 23, 24, 25, 26, 27
 
 # Rows of `lane`: the axes of the frame; sums of x^2, x y, y^2, w z^2 and of weights; the affine map
 # x = xx x', y = yx x' + yy y'; what of a term's square the terms before it left, at least; what is left of
@@ -335,7 +335,8 @@ def result(A, lane, T, through, k, out, at):
     others, _ = curvatures(B, where(through, constant, 0.0), *maps, frame, S)
     bias = (b - a for a, b in zip(values[:4], others[:4], strict=True))
     condition = where(count > 0, root((S[0] + S[2] + S[5]) * count), nan)
-    for column, x in enumerate((*values, sigma, *gains, condition, *bias, square, freedom, lane[LESS + k])):
+    squares = square, freedom, lane[LESS + k], lane[SZZ + k]
+    for column, x in enumerate((*values, sigma, *gains, condition, *bias, *squares)):
         out[at * COLUMNS + column] = x
 
 

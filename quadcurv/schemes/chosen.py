@@ -31,6 +31,8 @@ _ONE_SIDED = {(6, 3): 2e3, (6, 4): 2e3, (6, 5): 1e4, (4, 2): 1e3, (4, 3): 1e3, (
 # What noise leaves of its square in weighted residuals, and their degrees of freedom, both per point more
 # than terms: measured on quads and triangles, jittered or not, at valences 3 to 5.
 _LEFT = {6: (0.41, 0.67), 4: (0.31, 0.62), 2: (0.06, 0.57)}
+# Of the squares of all heights: less is the rounding of what the terms are taken from.
+_DIGITS = 2.0**-46
 # Times what noise explains with as many terms, from which on terms are the surface's.
 _RESOLVED = 5.0
 # Where noise prevails: degrees and rings if three do not do, and rings of quartics that are tried on.
@@ -262,6 +264,7 @@ def _resolved(fits: Floats, d: int, rounding: float) -> Bools:
     terms, freedom = 2 * d + 1, fits[:, kernel.FREEDOM]
     explained = (fits[:, kernel.LOWER] - fits[:, kernel.SQUARE]) * np.maximum(freedom, 1.0)
     exact = fits[:, kernel.SQUARE] <= rounding**2 * np.maximum(freedom, 1.0)
+    exact |= fits[:, kernel.SQUARE] <= _DIGITS * fits[:, kernel.WHOLE]
     return exact | (explained > _RESOLVED * terms * fits[:, kernel.SQUARE])
 
 
