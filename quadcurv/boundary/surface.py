@@ -100,7 +100,8 @@ def fitted(stencils: Stencils, vertices: Indices) -> Surfaces:
     known = np.isfinite(square)
     shared = np.where(known, square, 0.0).sum(axis=1) / np.maximum(known.sum(axis=1), 1)
     noise = np.where(np.isfinite(noise), np.sqrt(shared), np.inf)
-    error = np.where(np.isfinite(noise), noise * gain, np.inf)
+    with np.errstate(invalid="ignore"):  # an infinite one times nothing is none
+        error = np.where(np.isfinite(noise), noise * gain, np.inf)
     error = np.where(error < _DETERMINED * _distance(stencils, around, ring)[:, None], error, np.inf)
     best = np.arange(k), np.argmin(error, axis=1)
     chosen = [values[best] for values in (maps, coefficients, error, noise, bend)]
