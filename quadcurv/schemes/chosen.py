@@ -50,6 +50,22 @@ POOLED = _FAR
 REACH = POOLED + 5 + 1 + 6
 
 
+def unpacked(out: Floats, **more: Any) -> Curvatures:
+    """Columns of fits by their names, and what else is known."""
+    from quadcurv.kernels import jet as kernel
+
+    return Curvatures(
+        mean=out[:, kernel.MEAN],
+        gaussian=out[:, kernel.GAUSSIAN],
+        k1=out[:, kernel.K1],
+        k2=out[:, kernel.K2],
+        direction1=out[:, kernel.DIRECTION1],
+        direction2=out[:, kernel.DIRECTION2],
+        normal=out[:, kernel.NORMAL],
+        **more,
+    )
+
+
 class _Found:
     """Results so far, vertex by vertex."""
 
@@ -97,19 +113,11 @@ class _Found:
 
     def curvatures(self, on_crease: Bools) -> Curvatures:
         """What is known."""
-        kernel, out = self.kernel, self.values
-        errors = out[:, kernel.GAIN : kernel.GAIN + 4] * self.sigma[:, None]
-        interval = self.errors()
-        return Curvatures(
-            mean=out[:, kernel.MEAN],
-            gaussian=out[:, kernel.GAUSSIAN],
-            k1=out[:, kernel.K1],
-            k2=out[:, kernel.K2],
-            direction1=out[:, kernel.DIRECTION1],
-            direction2=out[:, kernel.DIRECTION2],
-            normal=out[:, kernel.NORMAL],
-            standard_error=StandardErrors(*errors.T),
-            interval=StandardErrors(*interval.T),
+        gain = self.values[:, self.kernel.GAIN : self.kernel.GAIN + 4]
+        return unpacked(
+            self.values,
+            standard_error=StandardErrors(*(gain * self.sigma[:, None]).T),
+            interval=StandardErrors(*self.errors().T),
             noise=self.sigma,
             degree=self.degree,
             rings=self.rings,

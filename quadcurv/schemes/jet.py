@@ -8,7 +8,7 @@ from typing import Literal
 import numpy as np
 
 from quadcurv.schemes.base import Curvatures, Fit, Neighbourhoods, StandardErrors
-from quadcurv.schemes.chosen import POOLED, REACH, chosen
+from quadcurv.schemes.chosen import POOLED, REACH, chosen, unpacked
 from quadcurv.types import Bools, Floats, Indices, Ints
 
 # Most that errors in height, of unit mean square, may grow to in the second derivatives, both in units of
@@ -136,14 +136,8 @@ def _fits(wanted: Bools, run: Run, degree: int, rings: int) -> tuple[Floats, Int
 def _unpacked(out: Floats, degree: Ints, rings: Ints) -> Curvatures:
     from quadcurv.kernels import jet as kernel
 
-    return Curvatures(
-        mean=out[:, kernel.MEAN],
-        gaussian=out[:, kernel.GAUSSIAN],
-        k1=out[:, kernel.K1],
-        k2=out[:, kernel.K2],
-        direction1=out[:, kernel.DIRECTION1],
-        direction2=out[:, kernel.DIRECTION2],
-        normal=out[:, kernel.NORMAL],
+    return unpacked(
+        out,
         standard_error=StandardErrors(*(out[:, kernel.GAIN + k] * out[:, kernel.SIGMA] for k in range(4))),
         noise=out[:, kernel.SIGMA],
         degree=degree,
