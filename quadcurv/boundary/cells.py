@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from quadcurv.boundary.closing import EXTRAPOLATED, FITTED, INTERIOR, OPEN, with_stars
 from quadcurv.boundary.poles import poles
-from quadcurv.boundary.sides import continued_side
+from quadcurv.boundary.sides import continued_sides
 from quadcurv.boundary.stars import bent, regular_stars
 from quadcurv.boundary.surface import fitted
 from quadcurv.mesh import StaggeredGrid
@@ -77,7 +77,8 @@ def cell_ghosts(grid: StaggeredGrid, known: Floats | None = None) -> tuple[Float
     r, c = grid.shape
     x = np.pad(grid.primal, [(1, 1), (1, 1), (0, 0)], constant_values=np.nan)
     rough, stencils = np.zeros(grid.shape, bool), grid.stencils()
-    for axis, size in ((0, c), (1, r)):
+    around, uneven = continued_sides(grid.primal, grid.wrap)
+    for axis in (0, 1):
         inner, beyond = np.moveaxis(grid.primal, axis, 0), np.moveaxis(x, axis, 0)
         if grid.wrap[axis]:
             beyond[[0, -1], 1:-1] = inner[[-1, 0]]
@@ -89,10 +90,9 @@ def cell_ghosts(grid: StaggeredGrid, known: Floats | None = None) -> tuple[Float
             if others is not None and np.isfinite(others[end, 1:-1]).any():  # a side meets another as a whole
                 beyond[end, 1:-1] = others[end, 1:-1]
                 continue
-            ghosts = np.empty((size, 3))
-            even = continued_side(grid.primal, axis, -end, ghosts, grid.wrap[1 - axis])
-            at = np.empty(0, int) if even is None else np.flatnonzero(~even)
-            if at.size:
+            ghosts = (around.beyond if axis == 0 else around.beside[:, 1:-1])[end]
+            if (axis, -end) in uneven:
+                at = np.flatnonzero(~uneven[axis, -end])
                 edges = np.stack((dual[end][at], dual[end][at + 1], dual[far][at], dual[far][at + 1]), axis=1)
                 across = inner[next_][at] if len(inner) > 1 else None
                 ghosts[at] = _fitted_cells(stencils, number[end][at], edges, across)

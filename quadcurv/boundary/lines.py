@@ -20,7 +20,7 @@ NODES, LEAST = 6, 4  # points of a line; how many there must be
 # does, or this part of what the one before does (the last but one does nothing where a line is odd); along
 # the normal, where noise of the surface shows, but for this part of all that the last but one does.
 SMOOTH, EARLIER, HIDDEN = 0.15, 0.002, 0.002
-_ROUNDING = 2.0**-95  # of coordinates, squared, as extrapolation magnifies it
+ROUNDING = 2.0**-95  # of coordinates, squared, as extrapolation magnifies it
 # Fourth-order schemes ask for more: the last point changes no more than this, squared, of what the changes of
 # the two points before it, as a geometric series, lead to expect.
 _EXPECTED = 9.0
@@ -61,7 +61,7 @@ def rounding_of(points: Floats) -> float:
 
     Of the farthest of them: a point near the origin may be a small difference of large numbers.
     """
-    return _ROUNDING * float(np.square(points).sum(axis=-1).max(initial=0.0))
+    return ROUNDING * float(np.square(points).sum(axis=-1).max(initial=0.0))
 
 
 @np.errstate(all="ignore")  # what overflows, or has no length, is NaN and has no ghosts

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from quadcurv.boundary.closing import REACH, closed
 from quadcurv.mesh import QuadGrid, StaggeredGrid
 from quadcurv.stencils import Stencils, grid_faces
-from quadcurv.types import Bools, Floats, Indices, Ints
+from quadcurv.types import Bools, Indices, Ints
 
 _POINT = 1e-9  # distance of such points, in distances to the next row
 _LEAST = 3  # of such points: a quad with two corners at one place is no pole
@@ -24,8 +24,13 @@ def poles(grid: QuadGrid | StaggeredGrid) -> Indices | None:
 
     None if none is.
     """
+    from quadcurv.kernels import border
+
     points = grid.points if isinstance(grid, QuadGrid) else grid.dual
     if isinstance(grid, QuadGrid) and grid.mask is not None:
+        return None
+    apart = 4 * _POINT + 32 * grid.roundoff
+    if border.all_apart(points, grid.wrap, apart * apart):
         return None
     found = None
     for axis in (0, 1):
@@ -34,8 +39,6 @@ def poles(grid: QuadGrid | StaggeredGrid) -> Indices | None:
         rows = np.moveaxis(points, axis, 0)
         for end in (0, -1):
             side, beside = rows[end], rows[1 if end == 0 else -2]
-            if _all_apart(side, beside, grid.roundoff):
-                continue
             step = np.linalg.norm(beside - side, axis=1)
             most = _POINT * step + 16 * grid.roundoff * np.abs(side).max()
             one = (np.abs(side - np.roll(side, -1, axis=0)).max(axis=1) <= most) & (most < 1e-3 * step)
@@ -47,13 +50,6 @@ def poles(grid: QuadGrid | StaggeredGrid) -> Indices | None:
                 of_side = np.moveaxis(found, axis, 0)[end]
                 of_side[pole >= 0] = pole[pole >= 0]
     return found
-
-
-def _all_apart(side: Floats, beside: Floats, roundoff: float) -> bool:
-    """Whether no point of a side is that of the next one, told in a tenth of the time."""
-    size = max(-min(side.min(), beside.min()), side.max(), beside.max())
-    apart = side - np.concatenate((side[1:], side[:1]))
-    return bool(np.einsum("kx,kx->k", apart, apart).min() > ((4 * _POINT + 32 * roundoff) * size) ** 2)
 
 
 def _of_runs(one: Bools, number: Indices) -> Indices:

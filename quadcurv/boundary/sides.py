@@ -8,10 +8,9 @@ import scipy
 from quadcurv.boundary.lines import (
     EARLIER,
     HIDDEN,
-    NODES,
+    ROUNDING,
     SMOOTH,
     index_weights,
-    rounding_of,
     without_excess,
 )
 from quadcurv.mesh import QuadGrid, StaggeredGrid
@@ -19,7 +18,6 @@ from quadcurv.stencils import Frame, Stencils
 from quadcurv.types import Bools, Floats, Indices, Ints, MeshError
 
 DEGREE = 4
-_WEIGHTS = index_weights(DEGREE)
 
 
 @np.errstate(all="ignore")
@@ -82,52 +80,37 @@ def _extension(size: int, wraps: bool, degree: int, layers: int) -> scipy.sparse
     return scipy.sparse.vstack((before, identity, after), format="csr")
 
 
-@np.errstate(all="ignore")
 def frame(grid: QuadGrid | StaggeredGrid, boundary: str) -> tuple[Frame, Indices]:
     """Ghosts by index around a grid, NaN where nothing is known; border vertices that they do not serve."""
     points = grid.points if isinstance(grid, QuadGrid) else grid.primal
     (r, c, _), wrap = points.shape, grid.wrap
-    beyond = points[[-1, 0]] if wrap[0] else np.full((2, c, 3), np.nan)
-    beside = np.full((2, 0 if wrap[1] else r + 2, 3), np.nan)
-    if all(wrap):
-        return Frame(beyond, beside), np.empty(0, np.int64)
-    bad = None
-    for axis, outside in enumerate((beyond, beside[:, 1:-1])):
-        if wrap[axis] or boundary == "nan":
-            continue
-        for end in (0, 1):
-            even = continued_side(points, axis, end, outside[end], wrap[1 - axis])
-            if even is not None:
-                bad = np.zeros((r, c), bool) if bad is None else bad
-                np.moveaxis(bad, axis, 0)[-end] |= _unserved(even, wrap[1 - axis])
-    for end in () if wrap[1] else (0, 1):
-        line = beyond[:, :: 1 - 2 * end]
-        beside[end, [0, -1]] = beside[end, [-2, 1]] if wrap[0] else _at_corner(line)
-    return Frame(beyond, beside), np.empty(0, np.int64) if bad is None else np.flatnonzero(bad)
+    if all(wrap) or boundary == "nan":
+        beyond = points[[-1, 0]] if wrap[0] else np.full((2, c, 3), np.nan)
+        return Frame(beyond, np.full((2, 0 if wrap[1] else r + 2, 3), np.nan)), np.empty(0, np.int64)
+    around, uneven = continued_sides(points, wrap)
+    if not uneven:
+        return around, np.empty(0, np.int64)
+    bad = np.zeros((r, c), bool)
+    for (axis, end), even in uneven.items():
+        np.moveaxis(bad, axis, 0)[-end] |= _unserved(even, wrap[1 - axis])
+    return around, np.flatnonzero(bad)
 
 
-def _at_corner(lines: Floats) -> Floats:
-    """Continue two lines of ghosts by index, NaN where these are too few."""
-    if lines.shape[1] <= DEGREE:
-        return np.full((2, 3), np.nan)
-    return lines[:, 0] + _WEIGHTS @ (lines[:, : DEGREE + 1] - lines[:, :1])
-
-
-def continued_side(points: Floats, axis: int, end: int, ghosts: Floats, wraps: bool) -> Bools | None:
-    """Write ghosts beyond a side; which lines are even, None if all are."""
+def continued_sides(points: Floats, wrap: tuple[bool, bool]) -> tuple[Frame, dict[tuple[int, int], Bools]]:
+    """Ghosts by index around a grid that is open somewhere; of sides (axis, end) not all even, which are."""
     from quadcurv.kernels import border
 
-    size, steps = len(ghosts), (3 * points.shape[1], 3)
-    if points.shape[axis] < NODES:
-        return np.zeros(size, bool)
-    inward, along = steps[axis], steps[1 - axis]
-    first = end * inward * (points.shape[axis] - 1)
-    excess = np.empty(size)
-    way = inward * (1 - 2 * end)
-    ends = np.moveaxis(points, axis, 0)[[-1, -5] if end else [0, 4]]
-    limits = SMOOTH, EARLIER, HIDDEN, rounding_of(ends)
-    border.continue_side(points, first, along, way, wraps, limits, ghosts, excess)
-    return without_excess(excess, _beside(size, wraps)) if excess.max() > 0 else None
+    r, c, _ = points.shape
+    beyond, beside, excess = border.continue_sides(points, wrap, (SMOOTH, EARLIER, HIDDEN, ROUNDING))
+    uneven = {}
+    if excess.max() > 0:
+        with np.errstate(invalid="ignore"):
+            for axis, lines in enumerate((excess[: 2 * c].reshape(2, c), excess[2 * c :].reshape(2, r))):
+                for end in (0, 1):
+                    if lines[end].max() > 0:
+                        pairs = _beside(lines[end].size, wrap[1 - axis])
+                        uneven[axis, end] = without_excess(lines[end], pairs)
+    return Frame(beyond, beside), uneven
 
 
 def _unserved(even: Bools, wraps: bool) -> Bools:
