@@ -4,12 +4,13 @@ As that of `rows`; a and b are the rows of dual points before and after row p.
 """
 
 from quadcurv.kernels.compiled import kernel
-from quadcurv.kernels.formulas import Carried, formula, span
+from quadcurv.kernels.formulas import Carried, bits, formula, span, where
 from quadcurv.kernels.quad import fluxes, quads_scale, ring_scale
 from quadcurv.kernels.rows import (
     AREA,
     FIRST,
     LENGTH,
+    MOST,
     NORMAL,
     QUAD_SQUARE,
     RING,
@@ -18,10 +19,12 @@ from quadcurv.kernels.rows import (
     SCALE,
     SQUARE,
     STRETCH,
+    TOGETHER,
     WIDTH,
     S,
     Y,
     dual_areas,
+    is_clear,
     last_quad,
     load_ends,
     load_row,
@@ -35,10 +38,12 @@ from quadcurv.kernels.vector import (
     dot,
     known_ring_square,
     known_square,
+    larger,
     less,
     middle,
     place,
     plus,
+    smaller,
     times,
     triple,
     unit,
@@ -46,7 +51,6 @@ from quadcurv.kernels.vector import (
 
 # In `work`, `NORMAL`, `QUAD_SQUARE`, `LENGTH` are of the quads beside the points of row p. Those below them:
 BELOW, BELOW_LENGTH, BELOW_SQUARE = 18 * S, 21 * S, 22 * S
-ROOMS = (4 * ROW, ROW + Y, 23 * S)
 
 
 def corners_below(planes, p, q, b, i):
@@ -75,10 +79,14 @@ def diagonals(corners):
 
 
 @formula
-def load_dual(planes, to, dual, at, width):
+def load_dual(planes, to, dual, at, width, far):
     """As `load_row`."""
+    most = Carried((far,))
     for k in span(0, width):
-        place(planes, to + k, Y, triple(dual, at + 3 * k, 1))
+        point = triple(dual, at + 3 * k, 1)
+        place(planes, to + k, Y, point)
+        most.set((larger(most.get()[0], bits(dot(point, point))),))
+    return most.get()[0]
 
 
 @formula
@@ -101,29 +109,53 @@ def first_edge(planes, p, a, b, work):
     place(work, FIRST - 1 + NORMAL, S, n)
 
 
+def quads(p, q, a, b, i, planes):
+    """Of the quads below and beside a point: planes of normals and of squares in `work`, corners."""
+    yield BELOW, BELOW_SQUARE, corners_below(planes, p, q, b, i)
+    yield NORMAL, QUAD_SQUARE, corners_right(planes, p, a, b, i)
+
+
+def ring(planes, a, b, i):
+    """The dual points around a point."""
+    return [triple(planes, k + i, Y) for k in (b + 1, a, a + 1, b)]
+
+
 @formula
-def edge_and_ring_normals(planes, p, q, a, b, work, g):
-    """Normals of the quads below and beside row p, and of the rings around it."""
-    for k in span(0, STRETCH):
+def edge_and_ring_normals(planes, p, q, a, b, work, g, width, padded):
+    """Normals of the quads below and beside row p, and of the rings around it; bits of the least square."""
+    least = Carried((MOST,))
+    for k in span(0, padded):
         i, j = FIRST + g + k, FIRST + k
-        for normal, square, corners in (
-            (BELOW, BELOW_SQUARE, corners_below(planes, p, q, b, i)),
-            (NORMAL, QUAD_SQUARE, corners_right(planes, p, a, b, i)),
-        ):
-            u, v = diagonals(corners)
-            n = cross(u, v)
-            place(work, j + normal, S, n)
-            work[j + square] = known_square(n, u, v, middle(*corners))
-        around = [triple(planes, k + i, Y) for k in (b + 1, a, a + 1, b)]
-        n = cross(*diagonals(around))
+        n = cross(*diagonals(ring(planes, a, b, i)))
         place(work, j + RING, S, n)
+        work[j + SQUARE] = square = dot(n, n)
+        found = bits(square)
+        for plane, squares, corners in quads(p, q, a, b, i, planes):
+            n = cross(*diagonals(corners))
+            place(work, j + plane, S, n)
+            work[j + squares] = square = dot(n, n)
+            found = smaller(found, bits(square))
+        (before,) = least.get()
+        least.set((smaller(before, where(k < width, found, MOST)),))
+    return least.get()[0]
+
+
+@formula
+def known_squares(planes, p, q, a, b, work, g, padded):
+    """Make squares zero that are but for rounding."""
+    for k in span(0, padded, 1):
+        i, j = FIRST + g + k, FIRST + k
+        for plane, squares, corners in quads(p, q, a, b, i, planes):
+            n = triple(work, j + plane, S)
+            work[j + squares] = known_square(n, *diagonals(corners), middle(*corners))
+        n, around = triple(work, j + RING, S), ring(planes, a, b, i)
         work[j + SQUARE] = known_ring_square(n, around, triple(planes, p + i, Y))
 
 
 @formula
-def edge_scales(work):
+def edge_scales(work, padded):
     """Make normals of quads of length one; scales from the squares of the rings' normals."""
-    for j in span(FIRST, FIRST + STRETCH, 2):
+    for j in span(FIRST, FIRST + padded, 2):
         for normal, square, lengths in (
             (BELOW, BELOW_SQUARE, BELOW_LENGTH),
             (NORMAL, QUAD_SQUARE, LENGTH),
@@ -135,10 +167,10 @@ def edge_scales(work):
 
 
 @formula
-def liu_edge_scales(work, part, g):
+def liu_edge_scales(work, part, g, padded):
     """Scales from the lengths of the quads' normals instead, the rings' elsewhere."""
     before = Carried((work[FIRST - 1 + LENGTH],))
-    for k in span(0, STRETCH):
+    for k in span(0, padded):
         i, j = FIRST + g + k + ROW, FIRST + k
         under, length = work[j + BELOW_LENGTH], work[j + LENGTH]
         lengths = (under + part[i]) + (length + before.get()[0])
@@ -186,15 +218,15 @@ def _pass(points, size, beyond, beside, dual, liu, Hn, H, normal, area, start, s
     scale = RING_SCALE if liu else SCALE
     for begin in range(0, c, WIDTH):
         end = min(begin + WIDTH, c)
-        p, q, a, b = 0, ROW, 2 * ROW, 3 * ROW
+        p, q, a, b, far = 0, ROW, 2 * ROW, 3 * ROW, 0
         for i in range(start - 1, stop + 1):  # p and a are rows i - 1 once they are there
             inside = 0 <= i < rows
             first = size * i if inside else 0 if i < 0 else 3 * c
             to, width, row = q + FIRST, end - begin, i + 1
-            load_row(planes, to, points, beyond, inside, first + 3 * begin, width, 0)
-            load_ends(planes, to, points, beyond, beside, inside, first, begin, end, c, row, rows, 0)
+            far = load_row(planes, to, points, beyond, inside, first + 3 * begin, width, far)
+            far = load_ends(planes, to, points, beyond, beside, inside, first, begin, end, c, row, rows, far)
             if i >= start:
-                load_dual(planes, b + FIRST, dual, 3 * ((c + 1) * i + begin), width + 1)
+                far = load_dual(planes, b + FIRST, dual, 3 * ((c + 1) * i + begin), width + 1, far)
             if i == start:
                 first_fluxes(planes, p, q, b, part, width)
             elif i > start:
@@ -202,10 +234,12 @@ def _pass(points, size, beyond, beside, dual, liu, Hn, H, normal, area, start, s
                 for left in range(begin, end, STRETCH):
                     right = min(left + STRETCH, end)
                     g, at, width = left - begin, (i - 1) * c + left, right - left
-                    edge_and_ring_normals(planes, p, q, a, b, work, g)
-                    edge_scales(work)
+                    padded = (width + TOGETHER - 1) & -TOGETHER
+                    if not is_clear(edge_and_ring_normals(planes, p, q, a, b, work, g, width, padded), far):
+                        known_squares(planes, p, q, a, b, work, g, padded)
+                    edge_scales(work, padded)
                     if liu:
-                        liu_edge_scales(work, part, g)
+                        liu_edge_scales(work, part, g, padded)
                     if vectors:
                         cell_vectors(planes, p, q, a, b, work, part, Hn, g, at, width)
                         if numbers:
@@ -232,4 +266,5 @@ def staggered_curvatures(points, size, beyond, beside, dual, liu, Hn, H, normal,
     liu, Hn, H, normal, area, start, stop
         As for `grid_curvatures`.
     """
-    _pass(points, size, beyond, beside, dual, liu, Hn, H, normal, area, start, stop, *rooms(ROOMS))
+    scratch = rooms(beyond.size // 6, 23 * S)
+    _pass(points, size, beyond, beside, dual, liu, Hn, H, normal, area, start, stop, *scratch)

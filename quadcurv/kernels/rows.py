@@ -37,6 +37,7 @@ LEAST_ROWS = 16  # of a range of its own, which computes a row of quads that oth
 PAGE = 512  # doubles
 Y = WIDTH + PAGE // 2  # between planes of a row
 ROW = 3 * Y  # between rows
+TOGETHER = 16  # of these, at least, by loops that have no remainder
 S = STRETCH + 8  # between planes of a stretch
 MOST = 2**63 - 1  # of bits
 FIRST = 8  # place of the first vertex in a plane, its left neighbour before it
@@ -45,22 +46,22 @@ FIRST = 8  # place of the first vertex in a plane, its left neighbour before it
 NORMAL, LENGTH, U, V, RING, SQUARE, RING_SCALE, SCALE, AREA, QUAD_SQUARE = (
     k * S for k in (0, 3, 4, 7, 10, 13, 14, 15, 16, 17)
 )
-ROOMS = (4 * ROW, ROW + Y, 18 * S, 3 * S)  # planes, part, work, and where vectors go that nobody wants
+PLANES = 16  # of the rows and of `part`
+ROOM = PLANES * Y + 2 * PAGE  # and the beginning of a page
 
 
-def rooms(sizes):
-    """Scratch for one call of a pass, each array at the beginning of a page.
+def rooms(c, size):
+    """Scratch for one call of a pass over c columns: rows, `part`, and `size` numbers, all zero.
 
     Stretches are computed whole, beyond the last column too: what lay in the memory before may be numbers so
     small that a processor takes a hundred times as long for each.
     """
-    room = np.zeros(sum(size + PAGE for size in sizes) + PAGE)
-    at = -(room.__array_interface__["data"][0] // 8) % PAGE
-    found = []
-    for size in sizes:
-        found.append(room[at : at + size])
-        at += -(-size // PAGE) * PAGE
-    return found
+    room = np.empty(ROOM + size)
+    room = room[-(room.__array_interface__["data"][0] // 8) % PAGE :]
+    planes, rest = room[: PLANES * Y], room[PLANES * Y : PLANES * Y + size]
+    planes.reshape(PLANES, Y)[:, : min(c, WIDTH) + 2 * STRETCH] = 0.0
+    rest[:] = 0.0
+    return planes[: 4 * ROW], planes[4 * ROW :], rest
 
 
 @formula
@@ -130,13 +131,13 @@ def last_quad(work):
         work[plane + FIRST - 1] = work[plane + FIRST + STRETCH - 1]
 
 
-def normals(planes, o, p, q, work, g, ring):
+def normals(planes, o, p, q, work, g, width, padded, ring):
     """Diagonals and normals of quads; with `ring` squares of the rings' normals, with 2 these too.
 
-    Returns the bits of the least square.
+    Returns the bits of the least square of the first `width` ones.
     """
     least = Carried((MOST,))
-    for k in span(0, STRETCH, 2):
+    for k in span(0, padded, 2):
         i, j = FIRST + g + k, FIRST + k
         u, v = diagonals(planes, p, q, i)
         place(work, j + U, S, u)
@@ -151,26 +152,27 @@ def normals(planes, o, p, q, work, g, ring):
             found = smaller(found, bits(square))
             if ring == 2:
                 place(work, j + RING, S, n)
-        least.set((smaller(least.get()[0], found),))
+        (before,) = least.get()
+        least.set((smaller(before, where(k < width, found, MOST)),))
     return least.get()[0]
 
 
 @formula
-def quad_normals(planes, p, q, work, g):
+def quad_normals(planes, p, q, work, g, width, padded):
     """As `normals`, of no rings."""
-    return normals(planes, None, p, q, work, g, 0)
+    return normals(planes, None, p, q, work, g, width, padded, 0)
 
 
 @formula
-def quad_normals_ring_squares(planes, o, p, q, work, g):
+def quad_normals_ring_squares(planes, o, p, q, work, g, width, padded):
     """As `normals`, without those of rings."""
-    return normals(planes, o, p, q, work, g, 1)
+    return normals(planes, o, p, q, work, g, width, padded, 1)
 
 
 @formula
-def quad_and_ring_normals(planes, o, p, q, work, g):
+def quad_and_ring_normals(planes, o, p, q, work, g, width, padded):
     """As `normals`."""
-    return normals(planes, o, p, q, work, g, 2)
+    return normals(planes, o, p, q, work, g, width, padded, 2)
 
 
 @formula
@@ -180,9 +182,9 @@ def is_clear(least, far):
 
 
 @formula
-def known_squares(planes, o, p, q, work, g, rings):
+def known_squares(planes, o, p, q, work, g, padded, rings):
     """Make squares zero that are but for rounding, those of the rings too if they are there."""
-    for k in span(0, STRETCH, 1):
+    for k in span(0, padded, 1):
         i, j = FIRST + g + k, FIRST + k
         normal, u, v = (triple(work, j + plane, S) for plane in (NORMAL, U, V))
         work[j + QUAD_SQUARE] = known_square(normal, u, v, quad_middle(planes, p, q, i))
@@ -193,19 +195,19 @@ def known_squares(planes, o, p, q, work, g, rings):
 
 
 @formula
-def finite_volume_scales(work):
+def finite_volume_scales(work, padded):
     """Make normals of quads of length one; scales from the squares of the rings' normals."""
-    for j in span(FIRST, FIRST + STRETCH, 4):
+    for j in span(FIRST, FIRST + padded, 2):
         work[j + SCALE] = ring_scale(work[j + SQUARE])
         n, _ = unit(triple(work, j + NORMAL, S), work[j + QUAD_SQUARE])
         place(work, j + NORMAL, S, n)
 
 
 @formula
-def liu_scales(work, part, g):
+def liu_scales(work, part, g, padded):
     """Make normals of quads of length one; scales from the lengths that they had."""
     before = Carried((work[FIRST - 1 + LENGTH],))
-    for k in span(0, STRETCH, 4):
+    for k in span(0, padded, 2):
         i, j = FIRST + g + k + ROW, FIRST + k
         n, length = unit(triple(work, j + NORMAL, S), work[j + QUAD_SQUARE])
         place(work, j + NORMAL, S, n)
@@ -215,13 +217,13 @@ def liu_scales(work, part, g):
         part[i] = both
         work[j + AREA] = lengths
         work[j + SCALE] = quads_scale(lengths)
-    work[FIRST + STRETCH - 1 + LENGTH] = before.get()[0]
+    work[FIRST + padded - 1 + LENGTH] = before.get()[0]
 
 
 @formula
-def ring_scales(work):
+def ring_scales(work, padded):
     """What gives the normals of rings length one."""
-    for j in span(FIRST, FIRST + STRETCH, 4):
+    for j in span(FIRST, FIRST + padded, 2):
         work[j + RING_SCALE] = ring_scale(work[j + SQUARE])
 
 
@@ -314,6 +316,7 @@ def _pass(points, size, beyond, beside, liu, Hn, H, normal, area, start, stop, p
             for left in range(begin, end, STRETCH):
                 right = min(left + STRETCH, end)
                 g, at, width = left - begin, i * c + left, right - left
+                padded = (width + TOGETHER - 1) & -TOGETHER
                 computed = i >= start - 1  # before, rows are only loaded
                 if computed:
                     # As the work on this stretch goes on, the next one arrives, a third at a time; all of it
@@ -331,13 +334,13 @@ def _pass(points, size, beyond, beside, liu, Hn, H, normal, area, start, stop, p
                         ask_to_write(area, at + width)
                     rings = wanted and not (liu and not (numbers or normals))
                     if not rings:
-                        least = quad_normals(planes, p, q, work, g)
+                        least = quad_normals(planes, p, q, work, g, width, padded)
                     elif numbers or normals:
-                        least = quad_and_ring_normals(planes, o, p, q, work, g)
+                        least = quad_and_ring_normals(planes, o, p, q, work, g, width, padded)
                     else:
-                        least = quad_normals_ring_squares(planes, o, p, q, work, g)
+                        least = quad_normals_ring_squares(planes, o, p, q, work, g, width, padded)
                     if not is_clear(least, far):
-                        known_squares(planes, o, p, q, work, g, rings)
+                        known_squares(planes, o, p, q, work, g, padded, rings)
                     ask(points, first + 3 * right + STRETCH)
                     if vectors:
                         ask_to_write(Hn, 3 * (at + width) + STRETCH)
@@ -348,11 +351,11 @@ def _pass(points, size, beyond, beside, liu, Hn, H, normal, area, start, stop, p
                 if not computed:
                     continue
                 if liu:
-                    liu_scales(work, part, g)
+                    liu_scales(work, part, g, padded)
                     if numbers or normals:
-                        ring_scales(work)
+                        ring_scales(work, padded)
                 else:
-                    finite_volume_scales(work)
+                    finite_volume_scales(work, padded)
                 ask(points, first + 3 * right + 2 * STRETCH)
                 if vectors:
                     ask_to_write(Hn, 3 * (at + width) + 2 * STRETCH)
@@ -395,4 +398,6 @@ def grid_curvatures(points, size, beyond, beside, liu, Hn, H, normal, area, star
         As these.
     start, stop : int
     """
-    _pass(points, size, beyond, beside, liu, Hn, H, normal, area, start, stop, *rooms(ROOMS))
+    planes, part, rest = rooms(beyond.size // 6, 21 * S)
+    work, unwanted = rest[: 18 * S], rest[18 * S :]
+    _pass(points, size, beyond, beside, liu, Hn, H, normal, area, start, stop, planes, part, work, unwanted)
