@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import warnings
+from typing import Any
 
 import numpy as np
 
-from quadcurv.device_arrays import on_host, taken
-from quadcurv.mesh import GridBlocks, Mesh, QuadGrid, QuadMesh
+from quadcurv.device_arrays import is_on_device, on_host, taken
+from quadcurv.mesh import GridBlocks, Mesh, QuadGrid, QuadMesh, StaggeredGrid
 from quadcurv.types import Floats, Indices, PrecisionWarning
 
 _SAMPLE = 512  # of the edges, whose lengths are looked at
@@ -30,24 +31,32 @@ def rounding_error(mesh: Mesh | GridBlocks) -> tuple[float, float]:
     extent : float
         Largest side of the bounding box, in length; both are of a sample of the edges.
     """
-    begin, end = map(on_host, _edges(mesh))
-    return error_at_edges(begin, end, mesh.roundoff)
+    if isinstance(mesh, GridBlocks):
+        begin, end = zip(*map(_ends, mesh), strict=True)
+        return error_at_edges(np.concatenate(begin), np.concatenate(end), mesh.roundoff)
+    if is_on_device(_points(mesh)) or (isinstance(mesh, QuadGrid) and mesh.mask is not None):
+        return error_at_edges(*_ends(mesh), mesh.roundoff)
+    return _error(_points(mesh), *_edges(mesh), mesh.roundoff)
 
 
 def error_at_edges(begin: Floats, end: Floats, roundoff: float) -> tuple[float, float]:
-    """The same of the ends (k, 3) of some edges."""
-    step = end - begin
-    length2 = np.einsum("ix,ix->i", step, step)
-    known = np.isfinite(length2) & (length2 > 0)
-    if not known.any():
+    """The same of the ends (k, 3) of some edges, those at holes NaN."""
+    known = np.isfinite(begin).all(axis=1) & np.isfinite(end).all(axis=1)
+    points = np.concatenate((begin[known], end[known]))
+    first = np.arange(len(points) // 2)
+    return _error(points, first, first + first.size, roundoff)
+
+
+def _error(points: Floats, first: Indices, second: Indices, roundoff: float) -> tuple[float, float]:
+    """The same of edges between finite points with some numbers."""
+    from quadcurv.kernels import extent
+
+    square, far, size = extent.steps(points, first, second)
+    square = square[square > 0]
+    if not square.size:
         return 0.0, 0.0
-    if not known.all():
-        begin, end, length2 = begin[known], end[known], length2[known]
-    ends = np.ascontiguousarray(np.concatenate((begin, end)).T)
-    low, high = ends.min(axis=1), ends.max(axis=1)
-    short = length2.size // 10
-    h2 = np.partition(length2, short)[short]
-    return float(2 * roundoff * max(-low.min(), high.max()) / h2), float((high - low).max())
+    short = square.size // 10
+    return 2 * roundoff * far / float(np.partition(square, short)[short]), size
 
 
 def warn_of_rounding(mesh: Mesh | GridBlocks, H: Floats) -> None:
@@ -80,22 +89,30 @@ def warn_of_error(error: float, extent: float, roundoff: float, H: Floats, level
 
 def sample(r: int, c: int) -> tuple[Indices, Indices]:
     """Rows and columns of some vertices of a grid."""
-    i, j = np.unravel_index(np.arange(0, r * c, r * c // _SAMPLE + 1), (r, c))
+    i, j = np.divmod(np.arange(0, r * c, r * c // _SAMPLE + 1), c)
     return i, j
 
 
-def _edges(mesh: Mesh | GridBlocks) -> tuple[Floats, Floats]:
-    """Ends (k, 3) of some edges."""
-    if isinstance(mesh, GridBlocks):
-        begin, end = zip(*map(_edges, mesh), strict=True)
-        return np.concatenate(begin), np.concatenate(end)
+def _points(mesh: Mesh) -> Any:
+    return mesh.primal if isinstance(mesh, StaggeredGrid) else mesh.points
+
+
+def _edges(mesh: Mesh) -> tuple[Indices, Indices]:
+    """Numbers of the vertices at the ends of some edges."""
     if isinstance(mesh, QuadMesh):
-        faces = mesh.faces[:: len(mesh.faces) // _SAMPLE + 1]
-        return taken(mesh.points, faces[:, [0, 1]].ravel()), taken(mesh.points, faces[:, [1, 2]].ravel())
-    x = mesh.points if isinstance(mesh, QuadGrid) else mesh.primal
-    r, c = x.shape[:2]
+        faces = mesh.faces[:: len(mesh.faces) // _SAMPLE + 1].astype(np.int64)
+        return faces[:, [0, 1]].ravel(), faces[:, [1, 2]].ravel()
+    r, c = mesh.shape
     i, j = sample(r, c)
-    below, beside = np.minimum(i, r - 2), np.minimum(j, c - 2)
-    first = np.concatenate((below * c + j, i * c + beside))
-    second = np.concatenate((below * c + c + j, i * c + beside + 1))
-    return taken(x.reshape(-1, 3), first), taken(x.reshape(-1, 3), second)
+    first = i * c + j
+    first = np.concatenate((first - c * (i == r - 1), first - (j == c - 1)))
+    second = first + 1
+    second[: i.size] += c - 1
+    return first, second
+
+
+def _ends(mesh: Mesh) -> tuple[Floats, Floats]:
+    """Positions (k, 3) of these ends, in memory wherever the mesh is."""
+    x = _points(mesh).reshape(-1, 3)
+    first, second = _edges(mesh)
+    return on_host(taken(x, first)), on_host(taken(x, second))

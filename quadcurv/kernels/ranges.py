@@ -88,8 +88,8 @@ if hasattr(os, "register_at_fork"):  # threads do not survive a fork: a child be
 def over(kernel, size, work, least=1):
     """Call kernel(start, stop) on ranges that make up 0..size; `work` vertices in all, `least` a range."""
     global _pool
-    count = threads()
-    if count == 1 or work < SERIAL_BELOW or size < 2 * least:
+    count = 1 if work < SERIAL_BELOW or size < 2 * least else threads()
+    if count == 1:
         kernel(0, size)
         return
     # Ever smaller ranges: whichever thread is held up, all end at about the same time.
