@@ -9,6 +9,7 @@ import quadcurv as qc
 from quadcurv import surfaces
 from quadcurv.boundary import EXTRAPOLATED, FITTED, OPEN, boundary_treatment, roughness
 from quadcurv.boundary.lines import extended
+from quadcurv.drivers.fits import MeshNeighbourhoods, fit_around
 from quadcurv.schemes import SCHEMES, Laplacian
 
 SURFACES = [
@@ -366,3 +367,44 @@ def test_dead_ends_of_few_points_are_nan_or_near():
     for scheme in CONVERGENT:
         error = np.abs(qc.mean_curvature(grid, scheme) - surface.mean_curvature(u, v))
         assert np.nanmax(error) < 0.6 * max(np.abs(k1).max(), np.abs(k2).max())
+
+
+# ---- one bad face far from the border ---------------------------------------------------------------------
+
+
+def with_a_vertex_in(grid, i, j):
+    """A grid's points and faces, one quad cut into triangles about its middle."""
+    mesh, c = grid.to_mesh(), grid.shape[1]
+    quad = [i * c + j, (i + 1) * c + j, (i + 1) * c + j + 1, i * c + j + 1]
+    faces = [list(map(int, f)) for f in mesh.faces if set(map(int, f)) != set(quad)]
+    faces += [[quad[k], quad[(k + 1) % 4], len(mesh.points)] for k in range(4)]
+    return np.vstack((mesh.points, mesh.points[quad].mean(axis=0))), faces
+
+
+@pytest.mark.parametrize("scheme", ["finite_volume", "jet-2", "jet", "jet-auto"])
+def test_a_corner_is_continued_as_its_sides_are(scheme):
+    """A strip too short to be sure of, near a corner, is continued by index as those beside it."""
+    grid, _ = damaged("elliptic_paraboloid", 20, "jitter", 0)
+    whole = qc.mean_curvature(grid, scheme)
+    H = qc.mean_curvature(with_a_vertex_in(grid, 4, 14), scheme)
+    off = np.abs(H[:-1].reshape(grid.shape) - whole)
+    assert off[:2, -3:].max() < 1e-9
+
+
+@pytest.mark.parametrize("scheme", ["jet", "jet-auto"])
+def test_fits_know_the_border_errors_of_their_own_rings(scheme):
+    """Three rings would end at a fitted surface, two read good ghosts: the error of the one is not theirs."""
+    grid, exact = damaged("catenoid", 20, "jitter", 0)
+    H = qc.mean_curvature(with_a_vertex_in(grid, 4, 4), scheme)
+    assert np.abs(H[:-1].reshape(grid.shape) - exact)[0].max() < 0.05
+
+
+def test_fits_that_share_neighbourhoods_are_what_they_are_alone():
+    mesh = qc.as_mesh(with_a_vertex_in(damaged("catenoid", 20, "jitter", 0.1)[0], 4, 4))
+    for order in (("jet-2", "jet", "jet-auto"), ("jet-auto", "jet", "jet-2")):
+        around = MeshNeighbourhoods(mesh, "extrapolate")
+        for scheme in order:
+            shared = fit_around(around, SCHEMES[scheme])
+            alone = qc.curvatures(mesh, scheme)
+            np.testing.assert_array_equal(shared.mean, alone.mean)
+            np.testing.assert_array_equal(shared.standard_error.mean, alone.standard_error.mean)

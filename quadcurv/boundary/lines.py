@@ -40,7 +40,8 @@ class Continued(NamedTuple):
     error : (k,) float64
         Their estimated error, infinite where they do not lie outside.
     smooth, even : (k,) bool
-        Whether the points are smooth functions of length, or of their index, beyond doubt.
+        Whether the points are smooth functions of length or of their index, beyond doubt; whether they are
+        continued by index.
     """
 
     ghosts: Floats
@@ -93,7 +94,7 @@ def extended(lines: Floats, turn: Floats, degree: int, layers: int, beside: Indi
     every = np.ones(len(lines), bool)
     ghosts = continued(x[:, : degree + 1], layers, every)
     error, even = _error(terms, ghosts, ends, degree)
-    smooth = even
+    smooth = by_index = even
     if not even.all():
         s, table = _newton(x)
         steps = _beyond(s, 0)[:, None] - s
@@ -103,7 +104,7 @@ def extended(lines: Floats, turn: Floats, degree: int, layers: int, beside: Indi
         by_index = even | (~smooth & (error <= other))
         ghosts = np.where(by_index[:, None, None], ghosts, by_length)
         error = np.where(by_index, error, other)
-    return Continued(lines[:, :1] + ghosts * size[:, None], error * size[:, 0], even | smooth, even)
+    return Continued(lines[:, :1] + ghosts * size[:, None], error * size[:, 0], even | smooth, by_index)
 
 
 def continued(lines: Floats, layers: int, even: Bools) -> Floats:

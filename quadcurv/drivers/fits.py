@@ -55,7 +55,7 @@ def fit_around(around: MeshNeighbourhoods, scheme: Fit) -> Curvatures:
             f"{scheme.name}: its fit gave H of shape {found.mean.shape}, expected {around.wanted.shape}"
         )
     if found.standard_error is not None:
-        found = _with_border_errors(found, around.border_error, around.border_noise)
+        found = _with_border_errors(found, around)
     unknown = ~around.wanted
     if unknown.any():
         found = each(found, lambda values: _masked(values, unknown))
@@ -72,8 +72,7 @@ class MeshNeighbourhoods:
         self.mesh, self.boundary = mesh, boundary
         self.stencils, self.present = _stencils(mesh)
         self.wanted = self.present & self.stencils.closed if boundary == "nan" else self.present
-        # Standard error of H and noise by surfaces fitted at the border: points read off these show none.
-        self.border_error, self.border_noise = np.full((2, self.stencils.n), np.nan)
+        self._border: dict[int, Floats] = {}
         x = self.stencils.points[: self.stencils.n][self.present]
         self.rounding = ROUNDING * float(np.abs(x).max(initial=0.0))
 
@@ -96,10 +95,21 @@ class MeshNeighbourhoods:
                     continue  # which the scheme looks at itself
                 own_error = out[:, jet.SIGMA] * out[:, jet.GAIN]
                 at = np.where(own_error <= _CLEARLY * error[at], -1, at)
-                self.border_error[vertices[at >= 0]] = error[at[at >= 0]]
+                self.border_error(rings)[vertices[at >= 0]] = error[at[at >= 0]]
             once, again = np.unique(at[at >= 0], return_inverse=True)  # all points of a pole are one vertex
             out[at >= 0] = faces.polynomials(once, degree, reach, kind)[again]
         return out
+
+    def border_error(self, rings: int) -> Floats:
+        """(n,): see `Neighbourhoods`."""
+        return self.at_border(rings)[0]
+
+    def at_border(self, rings: int) -> Floats:
+        """(2, n): standard error of H and noise by surfaces fitted at the border.
+
+        Points read off these show none. NaN where neighbourhoods of so many rings have no such points.
+        """
+        return self._border.setdefault(rings, np.full((2, self.stencils.n), np.nan))
 
     def positions(self, vertices: Indices, rings: int) -> tuple[Floats, Floats]:
         """(k, m, 3) and (k, 3): see `Neighbourhoods`."""
@@ -225,7 +235,7 @@ class MeshNeighbourhoods:
         vertices, surfaces = vertices[rows], surfaces.of(rows)
         error = surfaces.noise * surfaces.gain
         if not inside:
-            self.border_error[vertices], self.border_noise[vertices] = error, surfaces.noise
+            self.at_border(rings)[:, vertices] = error, surfaces.noise
         points = mirrored(self.stencils, surfaces, rings)
         place = np.full(self.stencils.n, -1)
         place[vertices] = np.arange(vertices.size)
@@ -464,10 +474,15 @@ def each(found: Curvatures, change: Callable[[Any], Any]) -> Curvatures:
     return Curvatures(**values)
 
 
-def _with_border_errors(found: Curvatures, error: Floats, noise: Floats) -> Curvatures:
+def _with_border_errors(found: Curvatures, around: MeshNeighbourhoods) -> Curvatures:
     """Curvatures with the errors of the surfaces that their neighbourhoods were completed from."""
     assert found.standard_error is not None
     own = found.standard_error.mean
+    error, noise = np.full((2, own.size), np.nan)
+    for r in range(1, _GHOST_LAYERS + 1):
+        at = np.full(own.size, True) if found.rings is None else found.rings == r
+        here = around.at_border(r)
+        error[at], noise[at] = np.fmax(error, here[0])[at], np.fmax(noise, here[1])[at]
     larger = error > own
     factor = np.divide(error, own, out=np.ones_like(own), where=larger & (own > 0))
     errors = StandardErrors(*(e * factor for e in found.standard_error))

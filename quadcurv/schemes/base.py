@@ -195,9 +195,6 @@ class Neighbourhoods(Protocol):
     ----------
     present, wanted : (n,) bool
         Vertices of one fan of faces, open or closed; those of them that want a curvature.
-    border_error : (n,) float64
-        Error of H where a neighbourhood was completed by points of a surface fitted at the border, after
-        `polynomials` did it; NaN elsewhere.
     rounding : float
         Of the positions, in length.
     on_crease, on_jump : (n,) bool
@@ -209,8 +206,6 @@ class Neighbourhoods(Protocol):
     @property
     def wanted(self) -> Bools: ...  # noqa: D102
 
-    @property
-    def border_error(self) -> Floats: ...  # noqa: D102
     @property
     def rounding(self) -> float: ...  # noqa: D102
     @property
@@ -228,6 +223,12 @@ class Neighbourhoods(Protocol):
         (k, COLUMNS) float64
             See :mod:`quadcurv.kernels.jet`, also for the kinds of fits. With `ghosts` neighbourhoods of up to
             three rings go on beyond smooth borders; else, and over more rings, they end there.
+        """
+
+    def border_error(self, rings: int) -> Floats:
+        """(n,): error of H where `polynomials` completed that many rings by a surface fitted at the border.
+
+        NaN elsewhere.
         """
 
     def pooled(self, values: Floats) -> Floats:

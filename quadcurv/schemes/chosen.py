@@ -140,7 +140,7 @@ def chosen(around: Neighbourhoods, most: int = 3) -> Curvatures:
     if vertices.size == 0:
         return found.curvatures(around.on_crease)
     fits = around.polynomials(vertices, 6, 3, kind=kernel.SMOOTH)
-    good = (fits[:, kernel.CONDITION] <= _CONDITION[6]) & np.isnan(around.border_error[vertices])
+    good = (fits[:, kernel.CONDITION] <= _CONDITION[6]) & np.isnan(around.border_error(3)[vertices])
     unresolved = good & ~_resolved(fits, 6, around.rounding)
     at = slice(None) if good.all() else good
     found.put(vertices[at], fits[at], 6, 3)
@@ -214,7 +214,7 @@ def _at_sides(around: Neighbourhoods, vertices: Indices, first: Floats, found: _
         if not ghosts:
             noisy[at[~resolved]] = True
             at = at[resolved]
-        beyond.append(np.nan_to_num(around.border_error[vertices]) if ghosts else np.zeros(vertices.size))
+        beyond.append(np.nan_to_num(around.border_error(r)[vertices]) if ghosts else np.zeros(vertices.size))
         found.put(vertices[at], here[at], d, r, beyond[-1][at])
         own = found.errors(vertices[at])[:, 0] ** 2
         whole = np.full((n, 1), np.nan)
