@@ -823,3 +823,61 @@ def damaged_array(shape, rng):
     points = np.stack((x, y, x**2 + y**2 / 2), axis=-1).reshape(-1, 3)
     points = damaged_points(points, rng) if rng.random() < 0.5 else points
     return points.reshape(r, c, 3) if isinstance(points, np.ndarray) and points.size == 3 * r * c else points
+
+
+# ---- open sides that coincide -----------------------------------------------------------------------------
+
+
+def tube(n=16, m=7, scale=1.0, offset=0.0):
+    """Around by along: the last row is the first one once more, but for rounding."""
+    t, z = np.meshgrid(np.linspace(0, 2 * np.pi, n), np.linspace(0, 1, m), indexing="ij")
+    return scale * np.stack((np.cos(t), np.sin(t), z), axis=-1) + offset
+
+
+@pytest.mark.parametrize(("scale", "offset"), [(1, 0), (1e-6, 0), (1e6, 0), (1e-3, 1e3)])
+@pytest.mark.parametrize("scheme", ["finite_volume", "bunge", "jet"])
+@pytest.mark.parametrize("axis", [0, 1])
+def test_open_sides_that_coincide_are_told_of_and_the_advice_works(axis, scheme, scale, offset):
+    points = np.moveaxis(tube(scale=scale, offset=offset), 0, axis)
+    name = ("rows", "columns")[axis]
+    with pytest.warns(MeshWarning, match=f"first and the last of the {name} of points coincide") as said:
+        qc.mean_curvature(QuadGrid(points), scheme)
+    advice = str(said[0].message).split("; ")[1].removesuffix(" closes it")
+    closed = eval(advice, {"QuadGrid": QuadGrid, "points": points})
+    assert closed.wrap == (axis == 0, axis == 1)
+    assert np.isfinite(qc.mean_curvature(closed, scheme)).all()
+
+    mesh = QuadGrid(points).to_mesh()
+    mesh = mesh.points, mesh.faces
+    with pytest.warns(MeshWarning, match="14 boundary vertices lie where others do") as said:
+        qc.mean_curvature(mesh, scheme)
+    advice = str(said[0].message).split("; ")[1].removesuffix(" closes it")
+    merged, _ = eval(advice, {"merge_points": qc.merge_points, "mesh": mesh})
+    assert np.count_nonzero(~merged.stencils().closed) == 2 * 15
+    assert np.abs(np.abs(qc.mean_curvature(merged, scheme)) * scale - 0.5).max() < 0.1
+
+
+def test_a_torus_is_closed_both_ways():
+    t = np.linspace(0, 2 * np.pi, 13)
+    u, v = np.meshgrid(t, t, indexing="ij")
+    points = np.stack(((2 + np.cos(u)) * np.cos(v), (2 + np.cos(u)) * np.sin(v), np.sin(u)), axis=-1)
+    with pytest.warns(MeshWarning, match=r"QuadGrid\(points\[:-1, :-1\], wrap=\(True, True\)\) closes it"):
+        qc.mean_curvature(QuadGrid(points))
+
+
+def test_cells_whose_open_sides_coincide_are_told_of():
+    corners = tube(33, 15)
+    primal, dual = corners[1::2, 1::2], corners[::2, ::2]
+    said = r"StaggeredGrid\(primal, dual, wrap=\(True, False\)\) closes it"
+    with pytest.warns(MeshWarning, match=said):
+        qc.mean_curvature(qc.StaggeredGrid(primal, dual))
+    qc.mean_curvature(qc.StaggeredGrid(primal, dual, wrap=(True, False)))
+
+
+def test_sides_that_are_only_near_are_not_told_of():
+    points = tube()
+    points[-1] *= 1 + 1e-4
+    qc.mean_curvature(QuadGrid(points))
+    hidden = np.zeros(points.shape[:2], bool)
+    hidden[[0, -1]] = True  # sides of holes alone coincide nowhere
+    qc.mean_curvature(QuadGrid(tube(), mask=hidden))

@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 from quadcurv.io.base import FORMATS, STORES, Content, checked_values, joined, library, warn
 from quadcurv.io.quads import quads_by_order
 from quadcurv.io.replacing import replacing
-from quadcurv.io.seams import closed_grid, warn_of_seam
+from quadcurv.io.seams import closed_grid, warn_of_open_sides, warn_of_seam
 from quadcurv.mesh import ChunkedGrid, GridBlocks, Mesh, QuadGrid, QuadMesh, Recovery, StaggeredGrid
 from quadcurv.types import MeshError
 
@@ -126,6 +126,8 @@ def opened(
     """As as_mesh, or of a path as read, without the warning of seams for who is about to close them."""
     if isinstance(mesh, QuadMesh | QuadGrid | StaggeredGrid):
         _refuse(quads, wrap, type(mesh).__name__)
+        if seams and not isinstance(mesh, QuadMesh):  # of whose seams the one was told who read it
+            warn_of_open_sides(mesh)
         return mesh
     if isinstance(mesh, GridBlocks):
         _refuse(quads, wrap, "GridBlocks")
@@ -134,7 +136,10 @@ def opened(
         return _read(mesh, quads, wrap, seams, join)
     if isinstance(mesh, tuple) and len(mesh) == 2:
         _refuse(quads, wrap, "tuple")
-        return QuadMesh(*mesh)
+        made = QuadMesh(*mesh)
+        if seams:
+            warn_of_seam(made)
+        return made
     entry = library(mesh)
     if entry is None:
         raise TypeError(

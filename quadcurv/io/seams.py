@@ -3,15 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from quadcurv.checks import checked_wrap
 from quadcurv.coincidence import first_at_place
+from quadcurv.device_arrays import is_on_device
 from quadcurv.io.base import SAME_PLACE, warn
-from quadcurv.mesh import QuadGrid, QuadMesh
-from quadcurv.types import MeshError
+from quadcurv.mesh import QuadGrid, QuadMesh, StaggeredGrid
+from quadcurv.types import Floats, MeshError
+
+_NAMES = "rows", "columns"
+_SAMPLES = 16  # points a direction that tell the extent of a grid
 
 
 def warn_of_seam(mesh: QuadMesh) -> None:
@@ -28,29 +33,68 @@ def warn_of_seam(mesh: QuadMesh) -> None:
         gap = np.linalg.norm(points - points[first], axis=1).max()
         one = int(np.argmax(shared))
         other = int(np.flatnonzero(first == one)[1])
+        # Chains of points within the tolerance are one place: no gap is wider than twice that to the first.
+        tolerance = f", tolerance={2 * gap:.1e}" if gap else ""
         warn(
             f"{np.count_nonzero(shared)} boundary vertices lie where others do, to {gap:.2g}, "
             f"first vertices {rim[one]} and {rim[other]}: the mesh is open along a seam; "
-            "merge_points closes it"
+            f"merge_points(mesh{tolerance}) closes it"
         )
 
 
-def closed_grid(points: NDArray[np.floating], wrap: Sequence[bool] | None, seams: bool) -> QuadGrid:
+def warn_of_open_sides(grid: QuadGrid | StaggeredGrid) -> None:
+    """Say so where the first and the last row or column of an open grid coincide."""
+    points, argument = (grid.points, "points") if isinstance(grid, QuadGrid) else (grid.dual, "dual")
+    if is_on_device(points) or (isinstance(grid, StaggeredGrid) and grid.has_ghosts):
+        return
+    open_ = [axis for axis in (0, 1) if not grid.wrap[axis] and _may_meet(points, axis)]
+    gaps = {axis: gap for axis in open_ if (gap := _gap(points, axis)) <= SAME_PLACE * _extent(points)}
+    if not gaps:
+        return
+    names = " and of the ".join(_NAMES[axis] for axis in gaps)
+    wrap = tuple(wraps or axis in gaps for axis, wraps in enumerate(grid.wrap))
+    left = ", ".join(":-1" if axis in gaps else ":" for axis in (0, 1)).removesuffix(", :")
+    given = f"{argument}[{left}]" if isinstance(grid, QuadGrid) else "primal, dual"
+    warn(
+        f"the first and the last of the {names} of {argument} coincide, to {max(gaps.values()):.2g}: the "
+        f"grid is open along a seam; {type(grid).__name__}({given}, wrap={wrap}) closes it"
+    )
+
+
+def _may_meet(points: Floats, axis: int) -> bool:
+    """Whether the first corner says no at once: the other side is farther from it than the next point."""
+    others = (points[-1, 0], points[1, 0]) if axis == 0 else (points[0, -1], points[0, 1])
+    first, last, following = (x.tolist() for x in (points[0, 0], *others))
+    away, step = (max(abs(a - b) for a, b in zip(first, x, strict=True)) for x in (last, following))
+    return not away > step > 0  # NaN says nothing
+
+
+def _gap(points: NDArray[np.floating[Any]], axis: int) -> float:
+    """How far the first and the last row or column are apart, infinite where they have other holes."""
+    one, other = points.take(0, axis), points.take(-1, axis)
+    gap = np.where(np.isnan(one) & np.isnan(other), 0, np.abs(one - other)).max()
+    return float("inf") if np.isnan(gap) or not np.isfinite(one).any() else float(gap)
+
+
+def _extent(points: NDArray[np.floating[Any]]) -> float:
+    steps = (max(1, size // _SAMPLES) for size in points.shape[:2])
+    some = points[tuple(slice(None, None, step) for step in steps)].reshape(-1, 3)
+    some = some[np.isfinite(some).all(axis=1)]
+    return float(np.ptp(some, axis=0).max()) if len(some) else 0.0
+
+
+def closed_grid(points: NDArray[np.floating[Any]], wrap: Sequence[bool] | None, seams: bool) -> QuadGrid:
     """The grid of a StructuredGrid, whose last row or column repeats the first where it wraps."""
     wraps = (False, False) if wrap is None else checked_wrap(wrap)
-    known = points[np.isfinite(points).all(axis=2)]
-    extent = np.ptp(known, axis=0).max() if len(known) else 0.0
-    for axis, name in enumerate(("rows", "columns")):
-        one, other = points.take(0, axis), points.take(-1, axis)
-        gap = np.where(np.isnan(one) & np.isnan(other), 0, np.abs(one - other)).max()
-        meets = gap <= SAME_PLACE * extent
-        if wraps[axis]:
-            if not meets:
-                raise MeshError(f"mesh: first and last {name} differ by {gap:.3g} although they wrap")
-            points = points.take(range(points.shape[axis] - 1), axis)
-        elif meets and seams and wrap is None:
+    extent = _extent(points)
+    gaps = [_gap(points, axis) for axis in (0, 1)]
+    meets = tuple(gap <= SAME_PLACE * extent for gap in gaps)
+    for axis, name in enumerate(_NAMES):
+        if wraps[axis] and not meets[axis]:
+            raise MeshError(f"mesh: first and last {name} differ by {gaps[axis]:.3g} although they wrap")
+        if meets[axis] and seams and wrap is None:
             warn(
                 f"first and last {name} of the StructuredGrid coincide: it is open along a seam that "
-                "wrap=... closes"
+                f"wrap={meets} closes"
             )
-    return QuadGrid(points, wraps)
+    return QuadGrid(points[tuple(slice(-1 if wrap else None) for wrap in wraps)], wraps)
