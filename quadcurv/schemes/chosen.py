@@ -43,7 +43,7 @@ _CHANCE = 0.2  # of the noise's square, that means over two rings of neighbours 
 _QUANTILE = 0.975
 _SMALLER = ((4, 2), (2, 1))
 _DOUBT = 0.02  # of the curvature, from which errors on others are asked
-_NEARLY_ALL = 0.8
+_NEARLY_ALL, _MOST = 0.8, 0.5
 _FAR = 12  # rings over which noise is looked for at most, where all is steep
 POOLED = _FAR
 # Fits over five rings at these, the normals of the rings, and how far creases and jumps are looked for.
@@ -147,7 +147,7 @@ def chosen(around: Neighbourhoods, most: int = 3) -> Curvatures:
     noisy = np.concatenate((vertices[unresolved], _at_sides(around, vertices[~good], fits[~good], found)))
     if noisy.size:
         steep = vertices[np.isnan(fits[:, kernel.CONDITION])]
-        noisy = np.union1d(noisy, _in_noise(around, vertices, steep, noisy))
+        noisy = _in_noise(around, vertices, steep, noisy)
         _average(around, noisy, found, most)
     _doubted(around, np.setdiff1d(vertices[good], noisy), found)
     return found.curvatures(around.on_crease)
@@ -174,7 +174,11 @@ def _doubted(around: Neighbourhoods, vertices: Indices, found: _Found) -> None:
 
 
 def _in_noise(around: Neighbourhoods, vertices: Indices, steep: Indices, noisy: Indices) -> Indices:
-    """Vertices nearly all of whose neighbours are noisy, and steep ones where most of the others are."""
+    """Noisy vertices, those nearly all of whose neighbours are, and steep ones where most of the others are.
+
+    But for those most of whose neighbours are not: noise of one vertex is seen from all around, so that there
+    it is chance, or a corner's ghosts.
+    """
     evidence = np.full(around.wanted.size, np.nan)
     evidence[vertices] = 0.0
     evidence[steep], evidence[noisy] = np.nan, 1.0
@@ -183,12 +187,14 @@ def _in_noise(around: Neighbourhoods, vertices: Indices, steep: Indices, noisy: 
         evidence = around.pooled(evidence[:, None])[:, 0]
         if rings == 2:
             chosen[vertices] = evidence[vertices] > _NEARLY_ALL
+        if rings == 3:
+            noisy = noisy[evidence[noisy] > _MOST]
         if rings > 2:  # what is nearest counts, however far others have to look
             nearest = np.where(np.isnan(nearest), evidence, nearest)
             if np.isfinite(nearest[steep]).all():
                 break
-    chosen[steep] |= nearest[steep] > 0.5
-    return np.flatnonzero(chosen)
+    chosen[steep] |= nearest[steep] > _MOST
+    return np.union1d(noisy, np.flatnonzero(chosen))
 
 
 def _at_sides(around: Neighbourhoods, vertices: Indices, first: Floats, found: _Found) -> Indices:
