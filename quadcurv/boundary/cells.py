@@ -1,7 +1,8 @@
 """Staggered grids: cells beyond open sides, whose centres alone are missing.
 
-By index where the centres are even, else on a surface fitted at the centre beside. Where the corners of a
-side are one point, a pole, the cells there have regular rings on fitted surfaces.
+By index where the centres are even. Elsewhere, and where the corners of a side are one point, a pole, the
+cells there have regular rings on fitted surfaces: a single centre beyond leaves the ring of a narrow cell
+lopsided, and finite volumes are off by as much as the widths of cells differ.
 """
 
 from __future__ import annotations
@@ -12,11 +13,11 @@ from numpy.typing import NDArray
 from quadcurv.boundary.closing import EXTRAPOLATED, FITTED, INTERIOR, OPEN, with_stars
 from quadcurv.boundary.poles import poles
 from quadcurv.boundary.sides import continued_sides
-from quadcurv.boundary.stars import bent, regular_stars
+from quadcurv.boundary.stars import regular_stars
 from quadcurv.boundary.surface import fitted
 from quadcurv.mesh import StaggeredGrid
 from quadcurv.stencils import Stencils
-from quadcurv.types import Bools, Floats, Indices
+from quadcurv.types import Floats, Indices
 
 
 def closed_cells(grid: StaggeredGrid, beyond: Floats | None = None) -> tuple[Stencils, NDArray[np.uint8]]:
@@ -27,16 +28,15 @@ def closed_cells(grid: StaggeredGrid, beyond: Floats | None = None) -> tuple[Ste
     centres, rough = cell_ghosts(grid, beyond)
     given = grid.stencils() if beyond is None else cells_within(grid, beyond)
     treated = cells_within(grid, centres)
-    closes = np.where(rough.ravel(), FITTED, EXTRAPOLATED)
-    treatment = np.where(given.closed, INTERIOR, np.where(treated.closed, closes, OPEN))
-    at_pole = cells_at_poles(grid)
-    if at_pole.size:
-        surfaces = fitted(given, at_pole)
+    treatment = np.where(given.closed, INTERIOR, np.where(treated.closed, EXTRAPOLATED, OPEN))
+    anew = np.union1d(cells_at_poles(grid), rough)
+    if anew.size:
+        surfaces = fitted(given, anew)
         rows = np.flatnonzero(np.isfinite(surfaces.error))
-        treatment[at_pole] = OPEN
-        treatment[at_pole[rows]] = FITTED
-        treated = with_stars(treated, [(at_pole[rows], regular_stars(given, surfaces.of(rows)))])
-        treated.closed[at_pole] = treatment[at_pole] != OPEN
+        treatment[anew] = OPEN
+        treatment[anew[rows]] = FITTED
+        treated = with_stars(treated, [(anew[rows], regular_stars(given, surfaces.of(rows)))])
+        treated.closed[anew] = treatment[anew] != OPEN
     return treated, treatment.astype(np.uint8)
 
 
@@ -68,15 +68,15 @@ def cells_at_poles(grid: StaggeredGrid) -> Indices:
 
 
 @np.errstate(all="ignore")
-def cell_ghosts(grid: StaggeredGrid, known: Floats | None = None) -> tuple[Floats, Bools]:
+def cell_ghosts(grid: StaggeredGrid, known: Floats | None = None) -> tuple[Floats, Indices]:
     """Centres of ghost cells around a staggered grid, (r + 2, c + 2, 3) with its own in the middle.
 
-    Those of `known` that are not NaN, else by index where the centres are even, else on a surface fitted at
-    the centre beside; NaN where nothing is known. Second, which (r, c) have one of the last kind.
+    Those of `known` that are not NaN, else by index where the centres are even, else NaN. Second, the cells,
+    flat, beside which they are not even.
     """
     r, c = grid.shape
     x = np.pad(grid.primal, [(1, 1), (1, 1), (0, 0)], constant_values=np.nan)
-    rough, stencils = np.zeros(grid.shape, bool), grid.stencils()
+    rough = np.zeros(grid.shape, bool)
     around, uneven = continued_sides(grid.primal, grid.wrap)
     for axis in (0, 1):
         inner, beyond = np.moveaxis(grid.primal, axis, 0), np.moveaxis(x, axis, 0)
@@ -84,32 +84,14 @@ def cell_ghosts(grid: StaggeredGrid, known: Floats | None = None) -> tuple[Float
             beyond[[0, -1], 1:-1] = inner[[-1, 0]]
             continue
         others = None if known is None else np.moveaxis(known, axis, 0)
-        dual = np.moveaxis(grid.dual, axis, 0)
-        number = np.moveaxis(np.arange(r * c).reshape(r, c), axis, 0)
-        for end, next_, far in ((0, 1, 1), (-1, -2, -2)):
+        for end in (0, -1):
             if others is not None and np.isfinite(others[end, 1:-1]).any():  # a side meets another as a whole
                 beyond[end, 1:-1] = others[end, 1:-1]
                 continue
             ghosts = (around.beyond if axis == 0 else around.beside[:, 1:-1])[end]
             if (axis, -end) in uneven:
-                at = np.flatnonzero(~uneven[axis, -end])
-                edges = np.stack((dual[end][at], dual[end][at + 1], dual[far][at], dual[far][at + 1]), axis=1)
-                across = inner[next_][at] if len(inner) > 1 else None
-                ghosts[at] = _fitted_cells(stencils, number[end][at], edges, across)
+                at = ~uneven[axis, -end]
+                ghosts[at] = np.nan
                 np.moveaxis(rough, axis, 0)[end][at] = True
             beyond[end, 1:-1] = ghosts
-    return x, rough
-
-
-def _fitted_cells(stencils: Stencils, vertices: Indices, edges: Floats, across: Floats | None) -> Floats:
-    """Centres beyond border edges: a parallelogram, bent as the one on the cell's other side is.
-
-    `edges` (k, 4, 3) are the ends of these edges and of the opposite ones, `across` the centres beyond those.
-    """
-    surfaces = fitted(stencils, vertices)
-    x = surfaces.flat(edges)
-    ghost = x[:, 0] + x[:, 1]
-    if across is not None:
-        twist = surfaces.flat(across[:, None])[:, 0] - x[:, 2] - x[:, 3]
-        ghost += bent(twist, x[:, 0], x[:, 1])
-    return surfaces.lifted(ghost[:, None])[:, 0]
+    return x, np.flatnonzero(rough)

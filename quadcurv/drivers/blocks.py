@@ -60,12 +60,12 @@ def _evaluate_cells(
     """Cells of block k among those of its neighbours."""
     centres = _centres(blocks, k)
     extrapolated = bool(blocks.open_sides(k)) and boundary == "extrapolate"
-    if scheme.fast is None or cells_at_poles(grid).size:
+    x, rough = cell_ghosts(grid, centres) if extrapolated else (centres, np.empty(0, np.int64))
+    if scheme.fast is None or rough.size or cells_at_poles(grid).size:
         given = cells_within(grid, centres)
         treated = closed_cells(grid, centres)[0] if extrapolated else given
         direct.evaluate(given, treated, scheme, results)
         return
-    x = cell_ghosts(grid, centres)[0] if extrapolated else centres
     beside = np.moveaxis(x[:, [0, -1]], 1, 0) if not grid.wrap[1] else np.empty((2, 0, 3))
     frame = Frame(np.ascontiguousarray(x[[0, -1], 1:-1]), np.ascontiguousarray(beside))
     compiled.evaluate_rows(grid, scheme.fast, boundary, results, frame)
