@@ -1,5 +1,6 @@
 """Pictures of a gallery script as sphinx-gallery wants them, and the order of the scripts."""
 
+import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.figure import Figure
 from PIL import Image
@@ -50,7 +51,9 @@ class Pictures:
             scene.close()
         plotters._ALL_PLOTTERS.clear()
         for value in block_vars["example_globals"].values():
-            if isinstance(value, Figure) and not any(value is figure for figure in self._seen):
+            if not isinstance(value, Figure) or getattr(value, "number", None) in plt.get_fignums():
+                continue  # the scraper of matplotlib sees to what pyplot holds
+            if not any(value is figure for figure in self._seen):
                 self._seen.append(value)
                 paths.append(next(block_vars["image_path_iterator"]))
                 value.savefig(paths[-1], dpi=150, bbox_inches="tight")
@@ -67,4 +70,7 @@ def _save(image, path):
         height = round(picture.height * _WIDTH / picture.width)
         picture = picture.resize((_WIDTH, height), Image.Resampling.LANCZOS)
     palette = picture.quantize(256, Image.Quantize.MAXCOVERAGE)
+    colours = np.array(palette.getpalette(), np.uint8).reshape(-1, 3)
+    colours[colours.min(axis=1).argmax()] = 255  # the page is white, and so is the picture around its subject
+    palette.putpalette(colours.tobytes())
     picture.quantize(palette=palette, dither=Image.Dither.FLOYDSTEINBERG).save(path, optimize=True)

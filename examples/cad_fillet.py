@@ -15,7 +15,7 @@ RADIUS = 5.0  # millimetres
 side, around = np.linspace(20, 0, 14, endpoint=False), np.linspace(0, np.pi / 2, 13)
 flat = np.stack([side, np.zeros_like(side)], axis=-1)
 arc = RADIUS * np.stack([-np.sin(around), np.cos(around) - 1], axis=-1)
-rest = np.stack([np.full_like(side, -RADIUS), -RADIUS - 20 + side], axis=-1)
+rest = np.stack([np.full_like(side, -RADIUS), -RADIUS - side[::-1]], axis=-1)
 profile = np.concatenate([flat, arc, rest])
 along = np.linspace(30, 0, 22)
 x, z = (np.repeat(profile[:, [k]], along.size, axis=1) for k in (0, 1))

@@ -32,7 +32,7 @@ for n in (32, 63):
 grid["K"] = grid.quadcurv.gaussian_curvature(wrap=(False, True))
 plotter = pv.Plotter(off_screen=True, window_size=(1000, 800))
 bar = {
-    "title": "K",
+    "title": "K\n",
     "vertical": True,
     "n_labels": 3,
     "label_font_size": 26,
