@@ -211,6 +211,15 @@ def test_view_without_a_display(ball, capsys, monkeypatch):
             r"--output: cannot write \.obj; there are \.csv, .*\.ply",
         ),
         (["curvature", "nosuch.obj", "-o", "out.ply", "-v", "torsion"], "value.*torsion"),
+        (["curvature", "nosuch.obj", "-o", "out.ply", "-v", "estimate"], "--value: jet has no estimate"),
+        (
+            ["curvature", "nosuch.obj", "-o", "a.ply", "-s", "jet-2", "-v", "interval_k1"],
+            "--value: jet-2 has no interval_k1",
+        ),
+        (
+            ["view", "nosuch.obj", "--html", "a.html", "--field", "error", "-s", "jet"],
+            "field: expected one of mean_curvature, gaussian_curvature, .*, got 'error'",
+        ),
         (
             ["view", "nosuch.obj", "--html", "a.html", "--field", "difference to liu", "-s", "jet"],
             "field: .*",
@@ -335,7 +344,7 @@ def test_closed_parts_are_oriented(tmp_path, capsys):
 def test_all_values_are_written_and_read_back(ball, tmp_path):
     assert run("curvature", ball, "-o", tmp_path / "out.vtp") == 0
     found, mesh = quadcurv.read_values(tmp_path / "out.vtp"), quadcurv.read(ball)
-    assert set(found) == set(VALUES)
+    assert set(found) == set(VALUES) - {"estimate"}
     fit = quadcurv.curvatures(mesh)
     for name, expected in (
         ("mean_curvature", fit.mean),
@@ -343,11 +352,27 @@ def test_all_values_are_written_and_read_back(ball, tmp_path):
         ("k1", fit.k1),
         ("direction2", fit.direction2),
         ("error_gaussian_curvature", fit.standard_error.gaussian),
+        ("interval_k1", fit.interval.k1),
+        ("interval_gaussian_curvature", fit.interval.gaussian),
+        ("feature", fit.feature),
         ("normal", fit.normal),
     ):
         assert np.array_equal(found[name], expected)
     assert found["shape_index"] == pytest.approx(1, abs=0.05)
     assert found["curvedness"] == pytest.approx(1, abs=0.05)
+
+
+def test_values_depend_on_what_the_scheme_knows(ball, tmp_path):
+    H = quadcurv.mean_curvature(ball, "liu")
+    assert run("curvature", ball, "-o", tmp_path / "liu.vtp", "-s", "liu") == 0
+    found = quadcurv.read_values(tmp_path / "liu.vtp")
+    assert set(found) == set(VALUES)
+    np.testing.assert_allclose(found["estimate"], H - quadcurv.mean_curvature(ball, "jet"), atol=1e-14)
+    assert run("curvature", ball, "-o", tmp_path / "jet-2.vtp", "-s", "jet-2") == 0
+    found = quadcurv.read_values(tmp_path / "jet-2.vtp")
+    assert not {name for name in found if name.startswith("interval")}
+    assert "feature" not in found
+    assert np.abs(found["estimate"]).max() > 1e-6
 
 
 @pytest.mark.parametrize(
@@ -381,7 +406,10 @@ def test_a_large_page_says_so_first(ball, tmp_path, capsys, monkeypatch):
     assert run("view", ball, "--html", tmp_path / "page.html") == 0
     said = capsys.readouterr().err.splitlines()
     assert said[0].startswith("quadcurv: warning: a page with all fields of 218 vertices")
+    assert "--thin, shows all on fewer vertices" in said[0]
     assert said[-1] == f"quadcurv: {tmp_path / 'page.html'}"
+    assert run("view", ball, "--thin", "--html", tmp_path / "thin.html") == 0
+    assert capsys.readouterr().err.splitlines() == [f"quadcurv: {tmp_path / 'thin.html'}"]
 
 
 def test_warnings_take_one_line(shared_meshes, capsys):

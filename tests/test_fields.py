@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from maps import made_up
 
-from quadcurv import QuadGrid, QuadMesh, surfaces
+from quadcurv import QuadGrid, QuadMesh, curvatures, surfaces
 from quadcurv.comparison import compare
 from quadcurv.mesh_quality import quality
 from quadcurv.viewing import FIELDS, Fields
@@ -26,41 +26,65 @@ def test_errors_have_whole_decades_and_colours_of_their_own_for_zero_and_nan():
     shown = field(made_up(a=H), "error")
     assert shown.limits == (-5, -2)
     np.testing.assert_allclose(
-        shown.values["a"], [*np.log10([3e-3, 2e-5]), -6, np.nan, *np.log10([5e-4, 3e-3])]
+        shown.coloured("a"), [*np.log10([3e-3, 2e-5]), -6, np.nan, *np.log10([5e-4, 3e-3])]
     )
+    np.testing.assert_array_equal(shown.values["a"], H)
     assert [label for _, label in shown.ticks()] == ["1e-5", "1e-4", "1e-3", "1e-2"]
     assert [label for label, _ in shown.patches()] == ["exactly 0", "undefined"]
-    assert [shown.text(v) for v in shown.values["a"][:4]] == ["0.003", "2e−05", "0", "undefined"]
+    assert [shown.text(v) for v in shown.values["a"][:4]] == ["0.003", "2e−5", "0", "undefined"]
 
 
 def test_errors_span_six_decades_and_smaller_ones_take_the_lowest_colour():
     shown = field(made_up(a=[1e-1, 1e-3, 1e-5, 1e-7, 1e-9, 1e-11]), "error")
     assert shown.limits == (-7, -1)
-    assert shown.values["a"].min() == -7
+    assert shown.coloured("a").min() == -7
     assert shown.ticks()[0][1] == "≤ 1e-7"
-    assert [shown.text(v) for v in shown.values["a"][2:]] == ["1e−05", "≤ 1e−07", "≤ 1e−07", "≤ 1e−07"]
+    assert [shown.text(v) for v in shown.values["a"][2:]] == [
+        "1e−5",
+        "1e−7",
+        "1e−9",
+        "1e−11",
+    ]  # the true ones
     assert shown.patches() == []
 
 
 def test_without_an_exact_answer_schemes_are_compared_with_their_median():
     shown = field(made_up(None, a=[1.0] * 4, b=[1.1] * 4, c=[3.0] * 4), "error")
-    np.testing.assert_allclose(10 ** shown.values["a"], 0.1)
-    np.testing.assert_allclose(10 ** shown.values["c"], 1.9)
+    np.testing.assert_allclose(10 ** shown.coloured("a"), 0.1)
+    np.testing.assert_allclose(10 ** shown.coloured("c"), 1.9)
     assert "median" in shown.title
-    assert shown.patches() == []  # that one scheme is the median is no exact answer
+    assert shown.patches() == [("exactly 0", ZERO_COLOUR)]  # zero looks alike in all fields
+
+
+def test_an_error_against_itself_is_not_shown():
+    two = Fields(made_up(None, a=[1.0] * 4, b=[1.1] * 4))
+    for name in ("error", "signed_error", "difference to a"):
+        assert list(two.field(name).values) == ["b"]
+    assert list(two.field("difference to b").values) == ["a"]
+    assert list(two.field("mean_curvature").values) == ["a", "b"]
+    alone = Fields(made_up(None, a=[1.0] * 4))
+    assert alone.first == "mean_curvature"
+    assert {"error", "signed_error"}.isdisjoint(alone.names)
+    with pytest.raises(ValueError, match=r"field: expected one of mean_curvature, estimate, .*, got 'error'"):
+        alone.field("error")
+    assert Fields(made_up(a=[1.0] * 4)).first == "error"
+    ball = surfaces.cubed_sphere().sample((4, 4), "faces")[0]
+    assert "estimate" not in Fields(compare(ball, ["jet"])).names
+    assert list(Fields(compare(ball, ["jet", "liu"])).field("estimate").values) == ["liu"]
 
 
 def test_difference_to_a_scheme_of_choice():
     found = made_up(a=[1.0, 2.0] * 2, b=[1.5, 2.0] * 2, c=[31.0, 2.5] * 2)
     assert Fields(found).names[-3:] == ["difference to a", "difference to b", "difference to c"]
-    for reference, differences in (("a", ["0", "0", "0.5", "0", "30", "0.5"]), ("b", ["0.5", "0", "0", "0"])):
+    for reference, differences in (("a", ["0.5", "0", "30", "0.5"]), ("b", ["0.5", "0", "29.5", "0.5"])):
         shown = field(found, f"difference to {reference}")
         texts = [shown.text(v) for values in shown.values.values() for v in values[:2]]
-        assert texts[: len(differences)] == differences
+        assert texts == differences
+        assert list(shown.values) == [scheme for scheme in "abc" if scheme != reference]
         assert shown.title.startswith(f"difference to {reference}")
         assert shown.patches() == [("exactly 0", ZERO_COLOUR)]
         assert shown.limits == (-1, 2)  # whichever is the reference
-    with pytest.raises(ValueError, match=r"field: expected .*, difference to SCHEME, got 'difference to d'"):
+    with pytest.raises(ValueError, match=r"field: expected .*, difference to c, got 'difference to d'"):
         field(found, "difference to d")
     assert Fields(made_up(a=[1.0] * 4)).names == list(FIELDS)
 
@@ -79,10 +103,9 @@ def test_qualities_of_every_kind():
     found = compare(bent, ["liu"])
     for measure, values in quality(bent).items():
         shown = field(found, measure)
-        known = 10 ** shown.values["liu"] if shown.logarithmic else shown.values["liu"]
-        some = values.ravel() > 1e-5
-        assert some.any()
-        np.testing.assert_allclose(known[some], values.ravel()[some])
+        assert list(shown.values) == [measure]  # once, under its own name
+        np.testing.assert_array_equal(shown.values[measure], values.ravel())
+        assert (values > 1e-5).any()
 
 
 def test_signed_scale_ends_where_five_percent_of_the_area_lie_beyond():
@@ -118,12 +141,52 @@ def test_principal_curvatures_on_a_torus():
         gap = np.sqrt(H**2 - K)
         errors.append(
             [
-                np.abs(field(found, name).values["jet"] - exact).max()
-                for name, exact in (("k1", H + gap), ("k2", H - gap), ("gaussian_curvature", K))
+                np.abs(field(found, name).values[f"{symbol} by jet"] - exact.ravel()).max()
+                for name, symbol, exact in (
+                    ("k1", "k1", H + gap),
+                    ("k2", "k2", H - gap),
+                    ("gaussian_curvature", "K", K),
+                )
             ]
         )
     assert max(errors[1]) < 0.02
     assert np.all(np.divide(*errors) > 6)  # better than second order
+
+
+def test_error_bars_estimates_and_creases():
+    surface = surfaces.torus()
+    mesh, xi, eta = surface.sample((48, 48), "faces")
+    shown = Fields(compare(mesh, ["finite_volume", "jet"], surface.mean_curvature(xi, eta)))
+    fit = curvatures(mesh)
+    for name, symbol, bars in (
+        ("mean_curvature", "H", fit.interval.mean),
+        ("gaussian_curvature", "K", fit.interval.gaussian),
+        ("k1", "k1", fit.interval.k1),
+        ("k2", "k2", fit.interval.k2),
+    ):
+        found = shown.field(f"interval_{name}")
+        np.testing.assert_array_equal(found.values[f"± of {symbol} by jet"], bars)
+        assert "95 %" in found.title
+        assert found.title.endswith("(1/length²)" if symbol == "K" else "(1/length)")
+        assert found.logarithmic
+    estimate = shown.field("estimate")
+    error = shown.field("error").values["finite_volume"].ravel()
+    assert list(estimate.values) == ["finite_volume"]
+    assert np.abs(estimate.values["finite_volume"] - error).max() < 0.1 * np.abs(error).max()
+    assert [shown.field("feature").text(v) for v in (0.0, 1.0, np.nan)] == ["smooth", "crease", "undefined"]
+
+
+def test_creases_of_a_box():
+    steps = np.linspace(0, 1, 9)
+    x, y = np.meshgrid(np.linspace(-1, 1, 17), steps, indexing="ij")
+    roof = QuadGrid(np.stack((x, y, -0.8 * np.abs(x)), axis=-1))
+    shown = field(compare(roof, ["liu"]), "feature")
+    creased = np.argwhere(shown.values["creases"].reshape(17, 9) == 1)
+    assert set(creased[:, 0]) == {8}
+    assert shown.ticks() == [(0, "smooth"), (1, "crease")]
+    assert [tuple(colour) for colour in shown.colour_table()[[0, 127, 128, 255], :3]] == [(255,) * 3] * 2 + [
+        (0,) * 3
+    ] * 2
 
 
 def test_unknown_field():

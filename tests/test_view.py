@@ -18,7 +18,8 @@ from quadcurv import surfaces, viewing
 from quadcurv.comparison import compare
 from quadcurv.refinement import convergence
 from quadcurv.viewing import opengl
-from quadcurv.viewing.scale import ZERO_COLOUR
+from quadcurv.viewing.geometry import OVERLAYS
+from quadcurv.viewing.scale import NAN_COLOUR, ZERO_COLOUR
 
 IMAGES = Path(__file__).parent / "images"
 GL_LIBRARIES = [
@@ -85,11 +86,67 @@ def test_unknown_suffix(pillow, tmp_path, name):
 
 @needs_opengl
 def test_plot_is_the_scene_of_the_maps(ellipsoid):
-    plotter = viewing.maps(ellipsoid, "valence")
+    plotter = viewing.maps(ellipsoid, "signed_error")
     plotter.show(auto_close=False)
     surfaces_shown = [r.actors["surface"].mapper.dataset for r in plotter.renderers[:3]]
-    assert [s["values"].tolist() for s in surfaces_shown] == [ellipsoid.valence.tolist()] * 3
+    for shown, errors in zip(surfaces_shown, ellipsoid.errors.values(), strict=True):
+        np.testing.assert_array_equal(shown["values"], errors)
     plotter.close()
+
+
+def drawn_views(view):
+    """Titles of what is seen."""
+    return [r.actors["title"].input for r in view.plotter.renderers if r.GetDraw() and seen(r)]
+
+
+def seen(renderer):
+    return "surface" in renderer.actors and renderer.actors["surface"].visibility
+
+
+@needs_opengl
+def test_a_field_takes_as_many_views_as_it_has(ellipsoid):
+    view = viewing.View(ellipsoid, off_screen=True)
+    assert view.views == drawn_views(view) == ["finite_volume", "liu", "cotan-6"]
+    for what in ("normals", "directions", "histogram", "overlays"):
+        view.toggle(what)
+    zoom = view.plotter.renderers[0].camera.parallel_scale
+    view.show_field("valence")
+    assert view.views == drawn_views(view) == ["valence"]
+    assert tuple(view.plotter.renderers[0].viewport)[::2] == (0, 1)  # across the whole window
+    assert view.plotter.renderers[0].actors["surface"].mapper.dataset["values"].tolist() == (
+        ellipsoid.valence.tolist()
+    )
+    view.show_field("difference to liu")
+    assert view.views == drawn_views(view) == ["finite_volume", "cotan-6"]
+    view.show_field("mean_curvature")
+    assert view.views == drawn_views(view) == ["finite_volume", "liu", "cotan-6"]
+    assert view.plotter.renderers[0].camera.parallel_scale == pytest.approx(zoom)
+    view.plotter.close()
+
+
+@needs_opengl
+def test_places_without_a_view_are_white(tmp_path):
+    ball = surfaces.cubed_sphere().sample((4, 4), "faces")[0]
+    found = compare(ball, ["liu", "jet", "cotan-6", "bunge", "bilinear"])
+    viewing.save_maps(found, tmp_path / "five.png", "mean_curvature")
+    assert (pixels(tmp_path / "five.png").max(axis=2) > 60).mean() > 0.97  # but for letters and lines
+
+
+@needs_opengl
+def test_legend_of_two_views_has_room_for_all_marks(monkeypatch):
+    """Six patches, all of them whole, right of the colour bar."""
+    H = np.full(40, 1e-2)
+    H[:8], H[-8:] = 0.0, np.nan
+    view = viewing.View(made_up(a=H, b=H), "error", off_screen=True)
+    marks = {"boundary": np.array([[0, 1]]), "seam": np.array([[2, 3]])}
+    marks |= {"valence < 4": np.array([3]), "valence > 4": np.array([5])}
+    monkeypatch.setattr(type(view._fields), "overlays", marks)
+    view.toggle("overlays")
+    picture = np.asarray(view.plotter.screenshot(return_img=True), float)[-180:, 700:]
+    for colour in [*OVERLAYS.values(), ZERO_COLOUR, NAN_COLOUR]:
+        here = (np.abs(picture - pyvista.Color(colour).int_rgb) <= 1).all(axis=2)
+        assert here.sum() > 900, colour
+    view.plotter.close()
 
 
 @needs_opengl

@@ -116,12 +116,23 @@ def screen():
     for program in ("Xvfb", "xdotool"):
         if shutil.which(program) is None:
             pytest.skip(f"not installed: {program}")
+    for _ in range(10):
+        server, number = started_server()
+        with ended(server):
+            if number:
+                yield f":{number}"
+                return
+    raise AssertionError("no screen in ten attempts")
+
+
+def started_server():
+    """An X server and the number of its display, empty where another one took that at the same time."""
     read, write = os.pipe()
     command = ["Xvfb", "-displayfd", str(write), "-screen", "0", "1700x700x24", "-nolisten", "tcp"]
     server = subprocess.Popen(command, pass_fds=[write], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
     os.close(write)
-    with ended(server), os.fdopen(read) as pipe:
-        yield f":{pipe.readline().strip()}"
+    with os.fdopen(read) as pipe:
+        return server, pipe.readline().strip()
 
 
 @pytest.fixture
@@ -155,18 +166,29 @@ def test_keys_and_buttons(window):
     window.click(523, 572)  # the button "histogram"
     window.becomes(shown=["edges", "histogram"])
     time.sleep(0.5)
+    assert is_blue(window, 523)
+    assert is_blue(window, 143)  # edges
     strip = np.s_[365:399, 40:360]  # below the left surface
     assert (window.picture()[strip] != before[strip]).any(axis=2).mean() > 0.02
     window.do("key", "h")
     window.becomes(shown=["edges"])
     time.sleep(0.5)
     assert (window.picture()[strip] == before[strip]).all()
+    assert not is_blue(window, 523)
     window.do("key", "Left")
     window.becomes(field="mean_curvature")
     window.do("key", "Left")
     window.becomes(field="difference to cotan-6")
     window.do("key", "m")
     window.becomes(shown=[])
+    time.sleep(0.5)
+    assert not is_blue(window, 143)
+
+
+def is_blue(window, x):
+    """Whether the button there shows that what it names is drawn."""
+    red, _, blue = window.picture()[572, x]
+    return blue > red + 60
 
 
 @needs_opengl

@@ -10,7 +10,8 @@ from typing import Annotated, Literal
 from cyclopts import Group, Parameter
 
 from quadcurv.schemes import SCHEMES, as_scheme
-from quadcurv.viewing import FIELDS, Style
+from quadcurv.viewing import Style
+from quadcurv.viewing.fields import field_names
 
 _MESH = Group("Mesh", sort_key=1)
 _PICTURE = Group("Pictures", sort_key=2)
@@ -74,13 +75,15 @@ class PictureOptions:
     camera
         Direction from the surface to the viewer: X Y Z.
     size
-        Width and height of a picture in pixels.
+        Width and height of a picture or a page in pixels.
     colours
         Colour map of matplotlib.
     title
         A line above all views.
     shading
         Light the surface, which shows its shape and falsifies colours.
+    thin
+        Show all fields of a page beyond 20 MB on fewer vertices, instead of fewer fields.
     """
 
     camera: Annotated[tuple[float, float, float] | None, Parameter(negative="")] = None
@@ -88,10 +91,11 @@ class PictureOptions:
     colours: Annotated[str | None, Parameter(("--colours", "--colors"))] = None
     title: str | None = None
     shading: Annotated[bool, Parameter(negative="")] = False
+    thin: Annotated[bool, Parameter(negative="")] = False
 
     def style(self, limits: tuple[float, float] | None = None) -> Style:
         """The same for :mod:`quadcurv.viewing`."""
-        return Style(self.camera, self.size, limits, self.colours, self.title, self.shading)
+        return Style(self.camera, self.size, limits, self.colours, self.title, self.shading, self.thin)
 
 
 def check_schemes(names: Iterable[str] | None) -> None:
@@ -103,9 +107,9 @@ def check_schemes(names: Iterable[str] | None) -> None:
         raise ValueError(f"--scheme: expected each once, got {', '.join(names)}")
 
 
-def check_field(field: str, schemes: Iterable[str] | None) -> None:
-    """Refuse an unknown field, and the difference to a scheme that is not shown."""
-    known = [*FIELDS, *(f"difference to {scheme}" for scheme in schemes or SCHEMES)]
+def check_field(field: str, schemes: Iterable[str] | None, exact: bool) -> None:
+    """Refuse a field that a comparison of these schemes does not have."""
+    known = field_names(list(schemes or SCHEMES), exact)
     if field not in known:
         raise ValueError(f"field: expected one of {', '.join(known)}, got {field!r}")
 

@@ -72,7 +72,7 @@ class PlotterComponent:
             shown = shown.within(limits)
         (name,) = fields.comparison.schemes
         surface = polydata(fields.drawn.points, fields.drawn.faces)
-        (surface.cell_data if fields.drawn.on_cells else surface.point_data)[_VALUES] = shown.values[name]
+        (surface.cell_data if fields.drawn.on_cells else surface.point_data)[_VALUES] = shown.coloured(name)
         bar = {
             "title": f"error in H, {name}\n",  # the empty line keeps it off the labels
             "fmt": "1e%.0f",
@@ -86,7 +86,7 @@ class PlotterComponent:
             "scalar_bar_args": bar,
             **surface_style(),
         }
-        if (shown.values[name] < shown.limits[0]).any():
+        if (shown.values[name] == 0).any():
             defaults["below_color"] = ZERO_COLOUR
             bar["below_label"] = "exactly 0"
         return self._plotter.add_mesh(surface, scalars=_VALUES, **(defaults | options))

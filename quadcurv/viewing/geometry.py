@@ -8,7 +8,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from quadcurv.mesh import Mesh, QuadGrid, StaggeredGrid
-from quadcurv.types import Floats, Ints
+from quadcurv.types import Floats, Indices, Ints
 
 OVERLAYS = {"boundary": "#000000", "seam": "#e69f00", "valence < 4": "#56b4e9", "valence > 4": "#d55e00"}
 """What can be marked on a surface, and its colour."""
@@ -77,6 +77,47 @@ def overlays(mesh: Mesh) -> dict[str, Ints]:
         "valence > 4": np.flatnonzero(interior & (valence > 4)).astype(np.int32),
     }
     return {name: vertices for name, vertices in marks.items() if len(vertices)}
+
+
+def thinned(whole: Drawn, most: int) -> tuple[Drawn, Indices, Indices]:
+    """Fewer points and faces: in every cube of space one point stands for all, that next to their mean.
+
+    Returns
+    -------
+    shape : Drawn
+        Of at most that many points, those without a face left out, and of the faces with corners in three
+        cubes or more, each once.
+    kept : (k,) int64
+        The points that are left or, where values belong to cells, the faces.
+    place : (n,) int64
+        To which of the points that are left each went, -1 of those without a face.
+    """
+    points, faces, on_cells = whole
+    used = np.unique(faces[faces >= 0])
+    x = points[used] - points[used].min(axis=0)
+    side = np.linalg.norm(np.ptp(x, axis=0)) / max(most, 1) ** 0.5
+    while True:
+        cubes, cube = np.unique(np.floor(x / (side or 1.0)).astype(np.int64), axis=0, return_inverse=True)
+        if len(cubes) <= max(most, 1):
+            break
+        side *= 1.1
+    cube = cube.ravel()
+    mean = np.stack([np.bincount(cube, axis) for axis in x.T], axis=1) / np.bincount(cube)[:, None]
+    nearest = np.argsort(np.linalg.norm(x - mean[cube], axis=1), kind="stable")
+    stands = used[nearest[np.unique(cube[nearest], return_index=True)[1]]]
+    place = np.full(len(points), -1, np.int64)
+    place[used] = cube
+    corners = place[np.where(faces < 0, faces[:, 2:3], faces)]
+    apart = corners != np.roll(corners, 1, axis=1)
+    sides = apart.sum(axis=1)
+    crossed = (corners[:, 0] == corners[:, 2]) | (corners[:, 1] == corners[:, 3])
+    left = np.flatnonzero((sides == 3) | ((sides == 4) & ~crossed))
+    first = np.argsort(~apart[left], axis=1, kind="stable")
+    corners = np.take_along_axis(corners[left], first, axis=1)
+    corners[:, 3] = np.where(sides[left] == 3, -1, corners[:, 3])
+    once = np.sort(np.unique(np.sort(corners, axis=1), axis=0, return_index=True)[1])
+    shape = Drawn(points[stands], corners[once].astype(np.int32), on_cells)
+    return shape, (left[once] if on_cells else stands).astype(np.int64), place
 
 
 def viewpoint(points: Floats, camera: tuple[float, float, float] | None = None) -> tuple[Floats, Floats]:

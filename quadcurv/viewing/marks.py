@@ -51,11 +51,15 @@ class Marks:
                 style["point_size"] = 9 * self._scale
                 yield pv.PolyData(points[vertices]), style
 
-    def normals(self, scheme: str) -> Iterator[Drawing]:
-        """Arrows H n, towards the centre of curvature; as long as 5 % of the surface at the scale's end."""
+    def normals(self, view: str) -> Iterator[Drawing]:
+        """Arrows H n, towards the centre of curvature; as long as 5 % of the surface at the scale's end.
+
+        In a view that is no scheme's H is that of jet.
+        """
         import pyvista as pv
 
-        H = self._fields.comparison.mean_curvature[scheme].ravel()
+        by_scheme = self._fields.comparison.mean_curvature
+        H = by_scheme[view].ravel() if view in by_scheme else self._fields.curvatures.mean.ravel()
         end = self._fields.field("mean_curvature").limits[1]
         length = 0.05 * self._diagonal * np.clip(H / end, -1, 1)
         vectors = -length[:, None] * self._vertex_normals()

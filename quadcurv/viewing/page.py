@@ -18,14 +18,15 @@ from numpy.typing import ArrayLike, DTypeLike, NDArray
 from quadcurv.comparison import Comparison
 from quadcurv.io.replacing import replacing
 from quadcurv.types import Floats
-from quadcurv.viewing.fields import FIELDS, OF_MESH, Fields
-from quadcurv.viewing.geometry import OVERLAYS, viewpoint
+from quadcurv.viewing.fields import FIELDS, Fields
+from quadcurv.viewing.geometry import OVERLAYS, thinned, viewpoint
 from quadcurv.viewing.scale import BARS, NAN_COLOUR, ZERO_COLOUR, Field
 from quadcurv.viewing.style import Style
 
-LIMIT = 20_000_000  # bytes; beyond that fields are left out
-_UNDEFINED, _MOST = -1e38, 1e27  # what the page takes for NaN, and the largest value it takes
-_DESCRIPTION = 2000  # bytes of a field without its values
+LIMIT = 20_000_000  # bytes; beyond that fields are left out, or the surface is thinned
+_UNDEFINED, _MOST, _LEAST = -1e38, 1e27, 1e-37  # what the page takes for NaN; sizes of values that it takes
+_DESCRIPTION = 4000  # bytes of a field without its values
+_FEW = 100  # vertices, below which a page is not thinned
 _SINGLE = 1e-20, 1e20  # limits of a scale that single precision holds with room around
 
 
@@ -57,136 +58,175 @@ class Page:
         )
 
 
-def make_page(comparison: Comparison, field: str = "mean_curvature", style: Style | None = None) -> Page:
-    """Linked views, one a scheme, and every field to choose from.
-
-    Parameters
-    ----------
-    comparison : Comparison
-    field : str
-        The one of :attr:`quadcurv.viewing.Fields.names` to show first.
-    style : Style
-        All but its size.
-
-    Returns
-    -------
-    Page
-        Of 20 MB at most where that can be: fields are left out, the one to show first excepted.
-
-    Raises
-    ------
-    ValueError
-        Unknown field; limits of the style that do not fit its scale.
-
-    Warns
-    -----
-    UserWarning
-        Fields were left out, or the page is larger nevertheless.
-    """
-    style = style or Style()
+def make_page(comparison: Comparison, field: str, style: Style) -> Page:
+    """Linked views, one a scheme, and every field to choose from; see :func:`quadcurv.viewing.html_page`."""
     fields = Fields(comparison)
     first = style.applied(fields.field(field))
-    points, faces, on_cells = fields.drawn
-    towards, up = viewpoint(points, style.camera)
-    centre = points.min(axis=0) / 2 + points.max(axis=0) / 2
-    extent = np.ptp(points, axis=0).max() or 1.0
-    areas = np.nan_to_num(comparison.areas)
-    data: dict[str, Any] = {
+    towards, up = viewpoint(fields.drawn.points, style.camera)
+    described = {
         "title": style.title,
         "shading": style.shading,
-        "field": field,
-        "schemes": comparison.schemes,
-        "on_cells": on_cells,
-        "points": _encode((points - centre) / extent, "<f4"),
-        "faces": _encode(faces, "<i4"),
-        "valence": _counts(comparison.valence),
-        "areas": _encode(areas / (areas.max() or 1.0), "<f4"),
-        "bars": BARS,
+        "size": style.size,
         "towards": towards.tolist(),
         "up": up.tolist(),
-        "overlays": [
-            {
-                "name": name,
-                "colour": OVERLAYS[name],
-                "lines": vertices.ndim == 2,
-                "vertices": _encode(vertices, "<u4"),
-            }
-            for name, vertices in fields.overlays.items()
-        ],
+        "field": field,
+        "schemes": comparison.schemes,
+        "bars": BARS,
         "undefined": _UNDEFINED,
         "most": _MOST,
         "undefined_colour": NAN_COLOUR,
         "zero_colour": ZERO_COLOUR,
     }
-    template = files("quadcurv.viewing").joinpath("page.html").read_text(encoding="utf-8")
-    size = len(template) + len(json.dumps(data))
-    data |= _chosen_fields(fields, field, first, size)
-    text = json.dumps(data).replace("<", "\\u003c")  # no name can end the script
+    template = _template()
+    content = (_all_on_fewer if style.thin else _fewer_on_all)(fields, first, field, len(template))
+    text = json.dumps(described | content).replace("<", "\\u003c")  # no name can end the script
     return Page(template.replace("@DATA@", text))
 
 
-def _chosen_fields(fields: Fields, name: str, first: Field, size: int) -> dict[str, Any]:
-    """Descriptions of the fields that the limit leaves room for, and their arrays, each stored once."""
+def _all_on_fewer(fields: Fields, first: Field, field: str, fixed: int) -> dict[str, Any]:
+    """All fields, on as many vertices as the limit leaves room for."""
+    shown = {name: first if name == field else fields.field(name) for name in fields.names}
+    part, surface = 1.0, _Surface(fields)
+    while True:
+        arrays: dict[bytes, int] = {}
+        found = [_field(name, f, arrays, surface.kept) for name, f in shown.items()]
+        geometry, descriptions = surface.describe(), len(json.dumps(found))
+        growing = len(json.dumps(geometry)) + len(arrays) * _in_base64(4 * len(surface.kept))
+        room = LIMIT - fixed - descriptions - _DESCRIPTION
+        if growing <= room or len(surface.kept) < _FEW:
+            return geometry | {"fields": found, "arrays": _as_text(arrays)}
+        part *= 0.97 * room / growing
+        surface = _Surface(fields, part)
+
+
+def _fewer_on_all(fields: Fields, first: Field, field: str, fixed: int) -> dict[str, Any]:
+    """The fields that the limit leaves room for, the one to show first in any case, on all vertices."""
+    surface, n = _Surface(fields), fields.comparison.valence.size
+    geometry = surface.describe()
+    size, one = fixed + len(json.dumps(geometry)), _in_base64(4 * n)
     arrays: dict[bytes, int] = {}
-    found = {name: _field(name, first, arrays)}
-    one = 4 * -(-4 * fields.comparison.valence.size // 3)  # bytes of an array in base64
+    found = {field: _field(field, first, arrays, surface.kept)}
     left_out = []
     for other in fields.names:
-        if other == name:
+        if other == field:
             continue
-        most = 1 if other in OF_MESH else len(fields.comparison.schemes)
         described = sum(len(json.dumps(f)) for f in found.values()) + _DESCRIPTION
-        if size + described + one * (len(arrays) + most) > LIMIT:
+        if size + described + one * (len(arrays) + len(fields.comparison.schemes)) > LIMIT:
             left_out.append(other)
         else:
-            found[other] = _field(other, fields.field(other), arrays)
+            found[other] = _field(other, fields.field(other), arrays, surface.kept)
     size += one * len(arrays)
     if left_out:
         beyond = "" if size <= LIMIT else f", and it still takes {size / 1e6:.0f} MB"
         warnings.warn(
-            f"a page with all fields of {fields.comparison.valence.size} vertices would take more than "
-            f"{LIMIT / 1e6:.0f} MB: without {', '.join(left_out)}{beyond}",
-            stacklevel=4,
+            f"a page with all fields of {n} vertices would take more than {LIMIT / 1e6:.0f} MB: without "
+            f"{', '.join(left_out)}{beyond}; Style(thin=True), or --thin, shows all on fewer vertices",
+            stacklevel=5,
         )
-    return {
-        "fields": [found[other] for other in fields.names if other in found],
-        "arrays": [base64.b64encode(a).decode() for a in arrays],
-    }
+    in_order = [found[name] for name in fields.names if name in found]
+    return geometry | {"fields": in_order, "arrays": _as_text(arrays)}
 
 
-def _field(name: str, field: Field, arrays: dict[bytes, int]) -> dict[str, Any]:
-    """Description of a field; its values by scheme are numbers of arrays."""
-    import matplotlib as mpl
+def _as_text(arrays: dict[bytes, int]) -> list[str]:
+    return [base64.b64encode(array).decode() for array in arrays]
 
+
+def _template() -> str:
+    """The page without its data, in one file."""
+    room = files("quadcurv.viewing")
+    page, style, surface, controls = (
+        room.joinpath(name).read_text(encoding="utf-8")
+        for name in ("page.html", "page.css", "page_surface.js", "page_controls.js")
+    )
+    return page.replace("@STYLE@", style).replace("@SCRIPT@", surface + controls)
+
+
+class _Surface:
+    """What is drawn: all of a comparison's mesh, or a part of as many points and faces."""
+
+    def __init__(self, fields: Fields, part: float = 1.0) -> None:
+        self._fields = fields
+        self._drawn = fields.drawn
+        self._place: NDArray[Any] = np.arange(len(self._drawn.points))
+        self.kept: NDArray[Any] = np.arange(fields.comparison.valence.size)  # whose values are shown
+        self._areas: NDArray[Any] = np.nan_to_num(fields.comparison.areas).ravel()
+        if part < 1:
+            self._drawn, self.kept, self._place = thinned(self._drawn, int(part * len(self._place)))
+            if self._drawn.on_cells:
+                self._areas = self._areas[self.kept]
+            else:  # of all that a point stands for
+                some = self._place >= 0
+                self._areas = np.bincount(self._place[some], self._areas[some], len(self.kept))
+
+    def describe(self) -> dict[str, Any]:
+        """Geometry, counts and marks as the page reads them."""
+        points, faces, on_cells = self._drawn
+        centre = points.min(axis=0) / 2 + points.max(axis=0) / 2
+        extent = float(np.ptp(points, axis=0).max()) or 1.0
+        return {
+            "on_cells": on_cells,
+            "points": _encode((points - centre) / extent, "<f4"),
+            "middle": centre.tolist(),
+            "extent": extent,
+            "faces": _encode(faces, "<i4"),
+            "numbers": _counts(self.kept),
+            "valence": _counts(self._fields.comparison.valence.ravel()[self.kept]),
+            "areas": _encode(self._areas / (self._areas.max() or 1.0), "<f4"),
+            "overlays": [
+                {
+                    "name": name,
+                    "colour": OVERLAYS[name],
+                    "lines": vertices.ndim == 2,
+                    "vertices": _encode(self._placed(vertices), "<u4"),
+                }
+                for name, vertices in self._fields.overlays.items()
+            ],
+        }
+
+    def _placed(self, vertices: NDArray[Any]) -> NDArray[Any]:
+        """Edges or vertices where they are drawn, each once."""
+        place = self._place[vertices]
+        if place.ndim == 2:
+            place = place[place[:, 0] != place[:, 1]]
+        return np.unique(place, axis=0)
+
+
+def _field(name: str, field: Field, arrays: dict[bytes, int], kept: NDArray[Any]) -> dict[str, Any]:
+    """Description of a field; its values by view are numbers of arrays."""
     unit = _unit(field)
     values = {}
-    for scheme, v in field.values.items():
-        array = _in_single_precision(v, unit)
-        values[scheme] = arrays.setdefault(array.tobytes(), len(arrays))
+    for view, v in field.values.items():
+        array = _in_single_precision(v[kept], unit)
+        values[view] = arrays.setdefault(array.tobytes(), len(arrays))
     return {
         "name": name,
         "label": name.replace("_", " ") if name in FIELDS else name,
         "title": field.title,
-        "limits": [end / unit for end in field.limits],
+        "limits": list(field.limits) if field.logarithmic else [end / unit for end in field.limits],
         "unit": unit,
         "logarithmic": field.logarithmic,
-        "shows_zero": field.shows_zero,
-        "colours": _encode(mpl.colormaps[field.colours](np.arange(256), bytes=True), "u1"),
-        "ticks": [(place / unit, label) for place, label in field.ticks()],
-        "patches": field.patches(),
+        "kinds": list(field.kinds),
+        "colours": _encode(field.colour_table(), "u1"),
         "values": values,
     }
 
 
 def _unit(field: Field) -> float:
-    """Power of ten that brings a linear scale into the range of single precision."""
-    end = max(map(abs, field.limits))
-    return 1.0 if field.logarithmic or _SINGLE[0] <= end <= _SINGLE[1] else 10.0 ** floor(log10(end))
+    """Power of ten that brings a scale into the range of single precision."""
+    end = field.limits[1] if field.logarithmic else log10(max(map(abs, field.limits)))
+    return 1.0 if log10(_SINGLE[0]) <= end <= log10(_SINGLE[1]) else 10.0 ** floor(end)
 
 
 def _in_single_precision(values: Floats, unit: float) -> NDArray[np.float32]:
-    with np.errstate(over="ignore"):
-        return np.nan_to_num(np.clip(values / unit, -_MOST, _MOST), nan=_UNDEFINED).astype("<f4")
+    """Values in a unit, NaN as the page knows it; what is not 0 does not become it."""
+    with np.errstate(over="ignore", under="ignore"):
+        size = np.clip(np.abs(values / unit), _LEAST, _MOST)
+    small = np.where(values == 0, 0.0, np.copysign(size, values))
+    return np.nan_to_num(small, nan=_UNDEFINED).astype("<f4")
+
+
+def _in_base64(size: int) -> int:
+    return 4 * -(-size // 3)
 
 
 def _counts(values: NDArray[Any]) -> dict[str, str]:

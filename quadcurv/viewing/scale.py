@@ -1,12 +1,13 @@
-"""Values on a colour scale: linear about zero, or decades."""
+"""Values on a colour scale: linear about zero, decades, or a few kinds."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import ceil, floor, log10
 
 import numpy as np
+from numpy.typing import NDArray
 
 from quadcurv.types import Floats
 
@@ -25,14 +26,15 @@ class Field:
     title : str
         What it is, with its unit.
     values : dict of str to (n,) float64 array
-        By scheme, as coloured: log10 where `logarithmic`. NaN where undefined.
+        By view: the scheme, or the field's own name where no scheme enters it. NaN where undefined.
     colours : str
         Name of a matplotlib colour map.
     limits : (float, float)
-        Ends of the scale; values beyond take the colours of its ends.
+        Ends of the scale, of log10 |value| where `logarithmic`; values beyond take the colours of its ends.
     logarithmic : bool
-    shows_zero : bool
-        Whether what is below the scale is exactly 0 and has a colour of its own.
+        Whether the scale is of decades: what is exactly 0 has a colour of its own.
+    kinds : sequence of str
+        Names of the values 0, 1, ... where there are no others.
     """
 
     title: str
@@ -40,24 +42,43 @@ class Field:
     colours: str
     limits: tuple[float, float]
     logarithmic: bool = False
-    shows_zero: bool = False
+    kinds: Sequence[str] = ()
+
+    def coloured(self, view: str) -> Floats:
+        """(n,) places on the scale: exact zeros lie one below it, other small ones at its lower end."""
+        values = self.values[view]
+        if not self.logarithmic:
+            return values
+        low = self.limits[0]
+        return np.where(values == 0, low - 1, np.maximum(logarithms(values), low))
+
+    def colour_table(self) -> NDArray[np.uint8]:
+        """(256, 4) colours from the lower to the upper end of the scale."""
+        import matplotlib as mpl
+
+        table, places = mpl.colormaps[self.colours], np.arange(256)
+        if self.kinds:
+            n = len(self.kinds)
+            table, places = table.resampled(n), places * n // 256
+        return np.asarray(table(places, bytes=True))
 
     def patches(self) -> list[tuple[str, str]]:
         """Labels and colours of what has no place on the scale: exact zeros and NaN, if there are any."""
         values = list(self.values.values())
-        zero = self.shows_zero and any((v < self.limits[0]).any() for v in values)
+        zero = self.logarithmic and any((v == 0).any() for v in values)
         undefined = any(np.isnan(v).any() for v in values)
         return [("exactly 0", ZERO_COLOUR)] * zero + [("undefined", NAN_COLOUR)] * undefined
 
-    def histogram(self, scheme: str, areas: Floats) -> Floats:
+    def histogram(self, view: str, areas: Floats) -> Floats:
         """(BARS,) parts of the area whose values lie in equal parts of the scale.
 
-        The first and the last include what lies beyond; exact zeros and NaN are in none.
+        The first and the last include what lies beyond; NaN, and exact zeros of a scale of decades, are in
+        none.
         """
         low, high = self.limits
-        values, weights = self.values[scheme], np.nan_to_num(areas).ravel()
-        some = np.isfinite(values) & ~(self.shows_zero & (values < low))
-        found = np.histogram(np.clip(values[some], low, high), BARS, self.limits, weights=weights[some])[0]
+        places, weights = self.coloured(view), np.nan_to_num(areas).ravel()
+        some = ~np.isnan(places) & ~(self.logarithmic & (places < low))
+        found = np.histogram(np.clip(places[some], low, high), BARS, self.limits, weights=weights[some])[0]
         return np.asarray(found / (weights.sum() or 1.0))
 
     def within(self, limits: tuple[float, float]) -> Field:
@@ -72,20 +93,21 @@ class Field:
         if not (np.isfinite(limits).all() and low < high and (low > 0 or not self.logarithmic)):
             expected = "0 < low < high" if self.logarithmic else "low < high"
             raise ValueError(f"limits: expected {expected}, got {limits}")
-        if not self.logarithmic:
-            return replace(self, limits=(float(low), float(high)))
-        low, high = log10(low), log10(high)
-        zero = self.limits[0]
-        values = {k: np.where(v < zero, low - 1, np.maximum(v, low)) for k, v in self.values.items()}
-        return replace(self, values=values, limits=(low, high))
+        return replace(
+            self, limits=(log10(low), log10(high)) if self.logarithmic else (float(low), float(high))
+        )
 
     def ticks(self) -> list[tuple[float, str]]:
         """Positions on the scale and their labels; "≤" and "≥" where values lie beyond its ends."""
+        if self.kinds:
+            return list(enumerate(self.kinds))
         low, high = self.limits
         places = self._decades() if self.logarithmic else np.linspace(low, high, 5).tolist()
         labels = [self._label(p) for p in places]
-        known = np.concatenate([v[np.isfinite(v)] for v in self.values.values()])
-        if (known == low if self.shows_zero else known < low).any():
+        known = np.concatenate([v[~np.isnan(v)] for v in self.values.values()])
+        if self.logarithmic:
+            known = logarithms(known[known != 0])
+        if (known < low).any():
             labels[0] = f"≤ {labels[0]}"
         if (known > high).any():
             labels[-1] = f"≥ {labels[-1]}"
@@ -100,17 +122,22 @@ class Field:
 
     def _label(self, place: float) -> str:
         if not self.logarithmic:
-            return f"{place:.3g}".replace("-", "−")
-        return f"1e{place:.0f}" if abs(place - round(place)) < 1e-9 else f"{10**place:.1e}"
+            return _short(place, 3)
+        mantissa, exponent = f"{10**place:.1e}".split("e")
+        return f"{float(mantissa):g}e{int(exponent)}"
 
     def text(self, value: float) -> str:
-        """What a coloured value stands for: a number, "undefined", or the end of a scale of decades."""
+        """A value as a reader wants it: a number, of errors without its sign, its kind, or "undefined"."""
         if np.isnan(value):
             return "undefined"
-        if self.shows_zero and value < self.limits[0]:
-            return "0"
-        number = f"{10 ** max(value, self.limits[0]) if self.logarithmic else value:.4g}".replace("-", "−")
-        return f"≤ {number}" if self.logarithmic and value <= self.limits[0] else number
+        if self.kinds:
+            return self.kinds[round(value)]
+        return _short(abs(value) if self.logarithmic else value, 5)
+
+
+def _short(value: float, digits: int) -> str:
+    mantissa, _, exponent = f"{value:.{digits}g}".partition("e")
+    return (f"{mantissa}e{int(exponent)}" if exponent else mantissa).replace("-", "−")
 
 
 def linear(title: str, values: Mapping[str, Floats], areas: Floats, unsigned: bool = False) -> Field:
@@ -123,17 +150,11 @@ def linear(title: str, values: Mapping[str, Floats], areas: Floats, unsigned: bo
     return Field(title, flat, "viridis" if unsigned else "RdBu_r", (0.0 if unsigned else -end, end))
 
 
-def decades(
-    title: str, values: Mapping[str, Floats], shows_zero: bool, limits: tuple[float, float] | None = None
-) -> Field:
+def decades(title: str, values: Mapping[str, Floats], limits: tuple[float, float] | None = None) -> Field:
     """Logarithmic scale, by default of the :func:`decade_limits` of the values."""
-    low, high = decade_limits(values.values()) if limits is None else limits
-    logs = {name: logarithms(v) for name, v in values.items()}
-    if shows_zero:  # small errors have the lowest colour, zeros alone lie below the scale
-        logs = {k: np.where(v == -np.inf, low - 1, np.maximum(v, low)) for k, v in logs.items()}
-    else:
-        logs = {k: np.maximum(v, low - 1) for k, v in logs.items()}
-    return Field(title, logs, "viridis", (low, high), logarithmic=True, shows_zero=shows_zero)
+    flat = {name: np.ravel(v) for name, v in values.items()}
+    ends = decade_limits(flat.values()) if limits is None else limits
+    return Field(title, flat, "viridis", ends, logarithmic=True)
 
 
 def decade_limits(values: Iterable[Floats]) -> tuple[float, float]:

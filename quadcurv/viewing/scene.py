@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 
 HISTOGRAM = 0.1  # its height to that of a view
 _LEGEND_HEIGHT = 120.0  # pixels, at scale 1
+_PATCHES, _ROWS = 0.42, 3  # part of the legend's width for patches side by side; else they stand in rows
 
 
 def polydata(points: Floats, faces: Ints) -> pv.PolyData:
@@ -42,9 +43,9 @@ def lookup_table(field: Field) -> Any:
 
 def colour_by(table: Any, field: Field) -> None:
     """Make a lookup table that of another field."""
-    table.apply_cmap(field.colours)
+    table.values = field.colour_table()
     table.scalar_range = field.limits
-    table.below_range_color = ZERO_COLOUR if field.shows_zero else None
+    table.below_range_color = ZERO_COLOUR if field.logarithmic else None
 
 
 def surface_style(shading: bool = False) -> dict[str, Any]:
@@ -85,8 +86,15 @@ class Scene:
         actor.mapper.SetRelativeCoincidentTopologyPointOffsetParameter(-20.0)
         return actor
 
-    def text(self, text: str, position: tuple[float, float], size: float, name: str | None = None) -> None:
-        """Text centred at a position of the view, in coordinates from 0 to 1."""
+    def text(
+        self,
+        text: str,
+        position: tuple[float, float],
+        size: float,
+        name: str | None = None,
+        justified: str = "center",
+    ) -> None:
+        """Text at a position of the view, in coordinates from 0 to 1."""
         import matplotlib as mpl
 
         actor = self.plotter.add_text(
@@ -99,7 +107,7 @@ class Scene:
             name=name,
             render=False,
         )
-        actor.prop.justification_horizontal = "center"
+        actor.prop.justification_horizontal = justified
         actor.prop.justification_vertical = "center"
         actor.prop.background_color = "white"  # arrows may reach behind a title
         actor.prop.background_opacity = 0.85
@@ -134,19 +142,29 @@ class Scene:
         self.plotter.renderer.RemoveAllViewProps()
         low, high = field.limits
         patches = [*field.patches(), *marks]
-        step = max(0.11, 140 / self.plotter.window_size[0])  # room for the labels side by side
-        left, right = 0.08, 0.92 - step * len(patches)
+        width = self.plotter.window_size[0]
+        step = max(0.11, 115 * self.scale / width)  # room for the labels side by side
+        in_rows = step * len(patches) > _PATCHES  # else
+        columns = -(-len(patches) // _ROWS) if in_rows else len(patches)
+        step = 135 * self.scale / width if in_rows else step
+        left, right = 0.08, 0.92 - step * columns - 0.02 * in_rows
         self.strip(np.linspace(left, right, 257), table.values[:, :3])
         self.text(field.title, ((left + right) / 2, 0.82), 11)
         for place, label in field.ticks():
             self.text(label, (left + (place - low) / (high - low) * (right - left), 0.2), 10)
         for i, (label, colour) in enumerate(patches):
-            x = right + step * (i + 1)
+            column, row = divmod(i, _ROWS) if in_rows else (i, 0)
+            x = right + 0.04 + step * (column + 0.25) if in_rows else right + step * (column + 1)
+            half, low_edge, high_edge = (0.13 * step, 0.7, 0.86) if in_rows else (0.03, 0.4, 0.62)
             for margin, fill in ((1.0, "grey"), (0.0, colour)):  # an outline, for what is pale
-                dx, dy = margin / self.plotter.window_size[0], margin / _LEGEND_HEIGHT
-                ends = np.array([x - 0.03 - dx, x + 0.03 + dx])
-                self.strip(ends, [pv.Color(fill).int_rgb], 0.4 - dy, 0.62 + dy)
-            self.text(label, (x, 0.2), 9)
+                dx, dy = margin / width, margin / _LEGEND_HEIGHT
+                ends = np.array([x - half - dx, x + half + dx])
+                drop = 0.28 * row
+                self.strip(ends, [pv.Color(fill).int_rgb], low_edge - drop - dy, high_edge - drop + dy)
+            if in_rows:
+                self.text(label, (x + 1.3 * half, 0.78 - drop), 8, justified="left")
+            else:
+                self.text(label, (x, 0.2), 9)
 
     def histogram(self, parts: Floats, highest: float, table: Any) -> list[vtkActor2D]:
         """Bars along the lower edge of the view, in the colours of equal parts of the scale."""
@@ -163,10 +181,17 @@ class Scene:
 def look_at(
     camera: pv.Camera,
     points: Floats,
-    direction: tuple[float, float, float] | None = None,
-    aspect: float = 1.0,
-) -> None:
-    """Fit the points into a view of some width to its height, the upper tenth left to the title."""
+    direction: tuple[float, float, float] | None,
+    aspect: float,
+    turned: bool,
+) -> Floats:
+    """Fit the points into a view of some width to its height, the upper tenth left to the title.
+
+    Returns
+    -------
+    (2,) float64
+        Half of what is seen across and up: of what is to be `turned` the radius of a ball around it all.
+    """
     towards, up = viewpoint(points, direction)
     right = np.cross(up, towards)
     right /= np.linalg.norm(right)
@@ -174,12 +199,20 @@ def look_at(
     seen = points @ axes.T
     centre, half = (seen.max(axis=0) + seen.min(axis=0)) / 2, np.ptp(seen, axis=0) / 2
     distance = 4 * np.linalg.norm(half)
+    if turned:
+        half[:] = 1.1 * np.linalg.norm(seen - centre, axis=1).max()  # arrows stand out
     camera.focal_point = centre @ axes
     camera.position = centre @ axes + distance * towards
     camera.up = axes[1]
     camera.parallel_projection = True
-    camera.parallel_scale = float(max(half[0] / 0.96 / aspect, half[1] / 0.88)) or 1.0
+    camera.parallel_scale = fitted_scale(half[:2], aspect)
     camera.SetWindowCenter(0, 0.08)
+    return half[:2]
+
+
+def fitted_scale(half: Floats, aspect: float) -> float:
+    """Half the height of a view, of some width to its height, that just holds half widths across and up."""
+    return float(max(half[0] / 0.96 / aspect, half[1] / 0.88)) or 1.0
 
 
 def make_room(camera: pv.Camera, room: bool) -> None:

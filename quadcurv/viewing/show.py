@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 from quadcurv.comparison import Comparison, compare
 from quadcurv.extras import need
 from quadcurv.io.replacing import replacing
+from quadcurv.viewing.fields import Fields
 from quadcurv.viewing.opengl import NoOpenGLError, opengl_problem, window_problem
 from quadcurv.viewing.page import Page, make_page
 from quadcurv.viewing.style import Style
@@ -32,7 +33,7 @@ def view(
     what : Comparison, or anything :func:`quadcurv.as_mesh` takes
         A mesh is shown with its curvature by jet.
     field : str
-        What the colours show first: of :data:`quadcurv.viewing.FIELDS`, or "difference to SCHEME".
+        What the colours show first: of :attr:`quadcurv.viewing.Fields.names`.
     style : Style
     refined : callable, optional
         Comparison at a refinement level 0 to 5, for a slider; `what` is that of level 2.
@@ -60,16 +61,19 @@ def view(
     window(_comparison(what), field, style, refined).plotter.show()
 
 
-def maps(what: Any, field: str = "error", style: Style | None = None) -> pv.Plotter:
+def maps(what: Any, field: str | None = None, style: Style | None = None) -> pv.Plotter:
     """Scene for a file or a notebook, with one linked view a scheme and one colour bar.
 
     Signed fields have a diverging scale, its ends passed on 5 % of the area; errors a logarithmic one of
-    whole decades. NaN is grey; in errors what is exactly 0 is pale pink.
+    whole decades. NaN is grey; what is exactly 0 on a logarithmic scale is pale pink. A field that no scheme
+    enters is drawn once.
 
     Parameters
     ----------
-    what, field, style
+    what, style
         As for :func:`view`.
+    field : str, optional
+        By default the error, or the mean curvature where there is nothing to compare it with.
 
     Returns
     -------
@@ -87,7 +91,8 @@ def maps(what: Any, field: str = "error", style: Style | None = None) -> pv.Plot
     >>> ball, _, _ = qc.surfaces.cubed_sphere().sample((4, 4), "faces")
     >>> maps(ball, "mean_curvature").screenshot("H.png")  # doctest: +SKIP
     """
-    return View(_comparison(what), field, style, off_screen=True).plotter
+    comparison = _comparison(what)
+    return View(comparison, field or Fields(comparison).first, style, off_screen=True).plotter
 
 
 def html_page(what: Any, field: str = "mean_curvature", style: Style | None = None) -> Page:
@@ -98,7 +103,8 @@ def html_page(what: Any, field: str = "mean_curvature", style: Style | None = No
     Parameters
     ----------
     what, field, style
-        As for :func:`view`; but for the size of the style, which is the browser's.
+        As for :func:`view`. Without a size in the style the page is as large as its window. The reader can
+        choose all but the title anew; the page's address holds what was chosen.
 
     Returns
     -------
@@ -112,7 +118,8 @@ def html_page(what: Any, field: str = "mean_curvature", style: Style | None = No
     Warns
     -----
     UserWarning
-        It would take more than 20 MB: fields were left out, or it is larger nevertheless.
+        It would take more than 20 MB: fields were left out, or it is larger nevertheless. A style that is
+        `thin` has all fields on fewer vertices.
 
     Examples
     --------
@@ -124,16 +131,16 @@ def html_page(what: Any, field: str = "mean_curvature", style: Style | None = No
     '<!doctype html>'
     """
     need("matplotlib")
-    return make_page(_comparison(what), field, style)
+    return make_page(_comparison(what), field, style or Style())
 
 
-def save_maps(what: Any, path: str | Path, field: str = "error", style: Style | None = None) -> None:
+def save_maps(what: Any, path: str | Path, field: str | None = None, style: Style | None = None) -> None:
     """Write maps to a file: one linked view a scheme, one colour bar for all.
 
     Parameters
     ----------
     what, field, style
-        As for :func:`view`.
+        As for :func:`maps`.
     path : path-like
         ``.png`` for a picture, which needs a usable OpenGL; ``.html`` for a page with linked views that
         needs none and no network.
@@ -158,7 +165,8 @@ def save_maps(what: Any, path: str | Path, field: str = "error", style: Style | 
     """
     path = Path(path)
     if path.suffix == ".html":
-        html_page(what, field, style).save(path)
+        comparison = _comparison(what)
+        html_page(comparison, field or Fields(comparison).first, style).save(path)
     elif path.suffix == ".png":
         problem = opengl_problem()
         if problem:

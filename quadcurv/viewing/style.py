@@ -20,7 +20,7 @@ class Style:
     camera : (float, float, float), optional
         Direction from the surface to the viewer.
     size : (int, int), optional
-        Width and height of a picture, or of a window, in pixels.
+        Width and height of a picture, a page or a window, in pixels.
     limits : (float, float), optional
         Ends of the colour scale of the field that is shown first, in its unit.
     colours : str, optional
@@ -29,6 +29,9 @@ class Style:
         A line above all views.
     shading : bool
         Whether surfaces are lit, which shows their shape and falsifies colours.
+    thin : bool
+        Whether a page of more than 20 MB shows all fields on fewer vertices, one for all in a cube of space,
+        instead of fewer fields on all vertices.
 
     Raises
     ------
@@ -49,6 +52,7 @@ class Style:
     colours: str | None = None
     title: str | None = None
     shading: bool = False
+    thin: bool = False
 
     def __post_init__(self) -> None:
         for name, number in (("camera", 3), ("size", 2), ("limits", 2)):

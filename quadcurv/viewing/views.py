@@ -18,6 +18,7 @@ from quadcurv.viewing.scale import Field
 from quadcurv.viewing.scene import (
     Scene,
     colour_by,
+    fitted_scale,
     look_at,
     lookup_table,
     make_room,
@@ -61,6 +62,8 @@ class View:
         Vertex, or cell of a staggered grid, in the order of flattened results.
     shown : set of str
         What is drawn over the surface, of "edges", "overlays", "normals", "directions" and "histogram".
+    views : list of str
+        Titles of the views: the schemes, or the field's own name where no scheme enters it.
 
     Raises
     ------
@@ -97,9 +100,10 @@ class View:
         self._drawn: dict[str, list[tuple[Any, Any]]] = {}
         self._fields = Fields(comparison)
         self._show(field)  # refuses an unknown one before there is a window
-        self._lay_out(len(comparison.schemes), off_screen)
+        self._lay_out(off_screen)
         self._table = lookup_table(self._shown)
         self._add_surfaces()
+        self._arrange()
         self.reset_camera()
         self._recolour()
         if len(self._fields.drawn.faces) < _LARGE:
@@ -115,6 +119,11 @@ class View:
         """Fields to choose from."""
         return self._fields.names
 
+    @property
+    def views(self) -> list[str]:
+        """Titles of the views."""
+        return list(self._shown.values)
+
     def show_field(self, name: str) -> None:
         """Colour all views by another field.
 
@@ -123,8 +132,15 @@ class View:
         ValueError
             Unknown field.
         """
+        for what in self.shown - {"edges", "histogram"}:
+            self._clear(what)
+        before = fitted_scale(self._half, self._aspect)
         self._show(name)
+        self._arrange()
+        self._camera.parallel_scale *= fitted_scale(self._half, self._aspect) / before
         self._recolour()
+        for what in self.shown - {"edges", "histogram"}:
+            self._redraw(what)
 
     def next_field(self, step: int = 1) -> None:
         """Colour all views by the next field, after the last one the first again."""
@@ -142,7 +158,7 @@ class View:
         else:
             self._redraw(what)
         if what == "histogram":
-            make_room(self.plotter.renderers[self._heads].camera, what in self.shown)
+            make_room(self._camera, what in self.shown)
         self._add_legend()
         self.plotter.render()
 
@@ -154,8 +170,6 @@ class View:
         self._fields = Fields(self.refined(self.level))
         self.picked = None
         self._add_surfaces()
-        for what in self.shown - {"edges"}:
-            self._redraw(what)
         self.show_field(self.field)
         self.write_below(f"refinement {self.level}", (0.86, 0.12), 6, name="refinement")
         self.plotter.render()
@@ -194,10 +208,10 @@ class View:
 
     def reset_camera(self) -> None:
         """Fit the surface into the views."""
-        self._subplot(0)
-        look_at(self.plotter.camera, self._fields.drawn.points, self.style.camera, self._aspect)
+        points, turned = self._fields.drawn.points, not self.plotter.off_screen
+        self._half = look_at(self._camera, points, self.style.camera, self._aspect, turned)
         if "histogram" in self.shown:
-            make_room(self.plotter.camera, True)
+            make_room(self._camera, True)
 
     def write_below(self, text: str, position: tuple[float, float], size: float, name: str) -> None:
         """Write into the row of the controls, in letters that do not depend on the window's size."""
@@ -211,25 +225,30 @@ class View:
 
     def _recolour(self) -> None:
         colour_by(self._table, self._shown)
-        for mapper, values, panel, coarse in zip(
-            self._mappers,
-            self._shown.values.values(),
-            self._panels,
-            self._coarse or self._panels,
-            strict=True,
-        ):
-            panel[VALUES] = values
+        for i, view in enumerate(self.views):
+            values = self._shown.coloured(view)
+            self._panels[i][VALUES] = values
             if self._coarse:
-                coarse[VALUES] = values[self._nearest]
-            mapper.scalar_range = self._shown.limits
+                self._coarse[i][VALUES] = values[self._nearest]
+            self._mappers[i].scalar_range = self._shown.limits
         self._add_legend()
         self._redraw("histogram")
         self._report()
 
-    def _lay_out(self, views: int, off_screen: bool) -> None:
-        """Rows for the heading, if there is one, the views, the legend and, in a window, the controls."""
+    @property
+    def _camera(self) -> pv.Camera:
+        """The one that all views share."""
+        return self.plotter.renderers[self._heads].camera
+
+    def _lay_out(self, off_screen: bool) -> None:
+        """Rows for the heading, if there is one, the views, the legend and, in a window, the controls.
+
+        A picture is as large as its own field needs.
+        """
         import pyvista as pv
 
+        panels = len(self.comparison.schemes)
+        views = len(self.views) if off_screen else panels
         self._heads = int(self.style.title is not None)
         around, controls = HEADING * self._heads + LEGEND, CONTROLS * (not off_screen)
         if self.style.size is None:
@@ -245,13 +264,12 @@ class View:
                 wide = PANEL * max(ceil(views / rows), 2)
                 return min(size[0] / wide, high / (PANEL * rows + around))
 
-            rows = max(range(1, views + 1), key=scaled)
-            scale = scaled(rows)
-        self._columns = ceil(views / rows)
-        panel = (size[1] - controls - around * scale) / rows
-        heights = [HEADING * scale] * self._heads + [panel] * rows + [LEGEND * scale]
+            scale = max(map(scaled, range(1, views + 1)))
+        self._area = size[0], size[1] - controls - around * scale  # pixels of all views
+        rows, self._columns = _grid(panels, self._area)
+        heights = [HEADING * scale] * self._heads + [self._area[1] / rows] * rows + [LEGEND * scale]
         heights += [controls] * (not off_screen)
-        self._aspect = size[0] / self._columns / panel
+        self._edge = 1 - heights[0] / size[1] if self._heads else 1.0  # upper, of the area, to the window
         self.legend_row = self._heads + rows
         self.control_row = self.legend_row + 1
         across = [*range(self._heads), *range(self.legend_row, len(heights))]
@@ -267,10 +285,27 @@ class View:
         )
         self.plotter.set_background("white")  # type: ignore[arg-type]  # self is hidden by a decorator
         self._scene = Scene(self.plotter, scale)
-        self.plotter.link_views(list(range(self._heads, self._heads + views)))
+        self._cells = range(self._heads, self._heads + rows * self._columns)
+        self.plotter.link_views(list(self._cells[:panels]))
         if self.style.title is not None:
             self.plotter.subplot(0, 0)
             self._scene.text(self.style.title, (0.5, 0.45), 13)
+
+    def _arrange(self) -> None:
+        """Give the views of the field the whole area; empty places are drawn, too, or they were black."""
+        rows, columns = _grid(len(self.views), self._area)
+        self._aspect = self._area[0] / columns / (self._area[1] / rows)
+        wide, high = 1 / columns, self._area[1] / self.plotter.window_size[1] / rows
+        for i, cell in enumerate(self._cells):
+            renderer, seen = self.plotter.renderers[cell], i < len(self.views)
+            for prop in renderer.GetViewProps():
+                prop.SetVisibility(seen)
+            renderer.SetInteractive(seen)
+            renderer.SetDraw(i < rows * columns)
+            row, column = divmod(i, columns)
+            if row < rows:
+                left, top = column * wide, self._edge - row * high
+                renderer.viewport = left, top - high, left + wide, top
 
     def _subplot(self, i: int) -> None:
         row, column = divmod(i, self._columns)
@@ -336,9 +371,9 @@ class View:
             self._add_histograms()
             return
         draw: Callable[[str], Iterator[Drawing]] = getattr(self._marks, what)
-        for i, scheme in enumerate(self.comparison.schemes):
+        for i, view in enumerate(self.views):
             self._subplot(i)
-            for mesh, style in draw(scheme):
+            for mesh, style in draw(view):
                 self._draw(what, mesh, **style)
 
     def _draw(self, what: str, mesh: pv.PolyData, **style: Any) -> None:
@@ -351,7 +386,7 @@ class View:
 
     def _add_histograms(self) -> None:
         """Under each surface how much of the area has which colour; the scale across is the colour bar's."""
-        parts = [self._shown.histogram(s, self.comparison.areas) for s in self.comparison.schemes]
+        parts = [self._shown.histogram(view, self.comparison.areas) for view in self.views]
         highest = max(p.max() for p in parts) or 1.0
         for i, part in enumerate(parts):
             self._subplot(i)
@@ -364,14 +399,12 @@ class View:
 
         points, faces, on_cells = self._fields.drawn
         self._clear("picked")
-        for i, scheme in enumerate(self.comparison.schemes):
+        for i, view in enumerate(self.views):
             self._subplot(i)
             value = (
-                ""
-                if self.picked is None
-                else f": {self._shown.text(self._shown.values[scheme][self.picked])}"
+                "" if self.picked is None else f": {self._shown.text(self._shown.values[view][self.picked])}"
             )
-            self._scene.text(scheme + value, (0.5, 0.95), 12, name="title")
+            self._scene.text(view + value, (0.5, 0.95), 12, name="title")
             if self.picked is None:
                 continue
             rows = [self.picked] if on_cells else (faces == self.picked).any(axis=1)
@@ -390,3 +423,11 @@ class View:
         marks = [(name, OVERLAYS[name]) for name in self._fields.overlays] if "overlays" in self.shown else []
         self.plotter.subplot(self.legend_row, 0)
         self._scene.legend(self._shown, self._table, marks)
+
+
+def _grid(n: int, area: tuple[float, float]) -> tuple[int, int]:
+    """Rows and columns of n views, as large as the area lets them be."""
+    return max(
+        ((rows, ceil(n / rows)) for rows in range(1, n + 1)),
+        key=lambda shape: min(area[0] / shape[1], area[1] / shape[0]),
+    )

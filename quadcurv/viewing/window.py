@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 from quadcurv.comparison import Comparison
@@ -10,6 +11,7 @@ from quadcurv.viewing.style import Style
 from quadcurv.viewing.views import View
 
 _COLOUR = "#0072b2"
+_SWITCHES = {"edges": "m", "overlays": "o", "normals": "n", "directions": "d", "histogram": "h"}  # and keys
 
 
 def window(
@@ -23,8 +25,8 @@ def window(
     The keys, and the buttons below the views, are: right and left arrow for the next and previous field,
     ``m`` for the edges of the mesh, ``o`` for boundaries, seams and extraordinary vertices, ``n`` for mean
     curvature normals, ``d`` for principal directions, ``h`` for the histogram by area under each view,
-    ``r`` to fit the camera. A click on the surface shows the values at the nearest vertex and its ring in
-    all views.
+    ``r`` to fit the camera. Buttons are blue while what they name is shown. A click on the surface shows the
+    values at the nearest vertex and its ring in all views.
 
     Parameters
     ----------
@@ -40,31 +42,43 @@ def window(
 
 
 def _add_buttons(view: View) -> None:
+    """Buttons that are blue while what they name is shown, whether by mouse or by key."""
     plotter = view.plotter
     plotter.subplot(view.control_row, 0)
     width = plotter.window_size[0]
+    switches: dict[str, Any] = {}
+
+    def toggle(what: str) -> None:
+        view.toggle(what)
+        show_state()
+        plotter.render()
+
+    def show_state() -> None:
+        for what, button in switches.items():
+            button.GetRepresentation().SetState(what in view.shown)
+
     buttons = [
-        ("next field (→)", "Right", view.next_field),
-        ("edges (m)", "m", lambda: view.toggle("edges")),
-        ("overlays (o)", "o", lambda: view.toggle("overlays")),
-        ("normals (n)", "n", lambda: view.toggle("normals")),
-        ("directions (d)", "d", lambda: view.toggle("directions")),
-        ("histogram (h)", "h", lambda: view.toggle("histogram")),
+        ("next field (→)", "Right", None),
+        *((f"{what} ({key})", key, what) for what, key in _SWITCHES.items()),
     ]
-    for i, (label, key, action) in enumerate(buttons):
+    for i, (label, key, what) in enumerate(buttons):
+        action = view.next_field if what is None else partial(toggle, what)
         x = 35 + 95 * i
-        plotter.add_checkbox_button_widget(
+        button = plotter.add_checkbox_button_widget(
             lambda _, action=action: action(),
             position=(x, 30),
             size=26,
             border_size=2,
             color_on=_COLOUR,
-            color_off=_COLOUR,
+            color_off=_COLOUR if what is None else "white",
             background_color="black",
         )
+        if what is not None:
+            switches[what] = button
         view.write_below(label, ((x + 13) / width, 0.15), 6, name=label)
         plotter.add_key_event(key, action)
     plotter.add_key_event("Left", lambda: view.next_field(-1))
+    show_state()
 
 
 def _add_slider(view: View) -> None:
