@@ -330,6 +330,27 @@ def test_grids_are_closed_where_they_meet(tmp_path, capsys):
     assert json.loads(capsys.readouterr().out)["undefined"]["liu"] == 2 * (9 + 24) - 2
 
 
+def test_arrays_of_points_are_grids(tmp_path, capsys):
+    grid = surfaces.torus().sample((24, 16))[0]
+    path, out = tmp_path / "grid.npy", tmp_path / "H.csv"
+    np.save(path, grid.points)
+    assert run("curvature", path, "--wrap", "both", "-o", out, "-s", "liu") == 0
+    H = np.genfromtxt(out, delimiter=",", names=True)["mean_curvature"]
+    np.testing.assert_allclose(H, quadcurv.mean_curvature(grid, "liu").ravel(), rtol=1e-12)
+    np.save(path, np.pad(grid.points, ((0, 1), (0, 1), (0, 0)), mode="wrap"))
+    capsys.readouterr()
+    assert run("view", path, "-s", "jet", "--html", tmp_path / "map.html") == 0
+    assert "closed there" in capsys.readouterr().err
+    np.save(path, np.zeros((3, 4)))
+    page = tmp_path / "map.html"
+    assert "points: shape (3, 4), expected (r, c, 3)" in refusal(capsys, "view", path, "--html", page)
+
+
+def test_without_a_command_help_is_shown(capsys):
+    assert run() == 0
+    assert "Usage: quadcurv COMMAND" in capsys.readouterr().out
+
+
 def test_closed_parts_are_oriented(tmp_path, capsys):
     mesh = surfaces.cubed_sphere().sample((6, 6), "faces")[0]
     path = tmp_path / "inside_out.obj"

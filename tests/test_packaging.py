@@ -16,7 +16,13 @@ import quadcurv as qc
 
 ROOT = Path(__file__).parents[1]
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
-ELSEWHERE = {"libigl": "igl", "mapbox-earcut": "mapbox_earcut"}  # names in conda-forge
+BUILD = tomllib.loads((ROOT / "pyproject.toml").read_text())["build-system"]
+ELSEWHERE = {  # names in conda-forge
+    "libigl": "igl",
+    "mapbox-earcut": "mapbox_earcut",
+    "matplotlib": "matplotlib-base",
+    "vtk": "vtk-base",
+}
 
 
 @pytest.fixture(scope="session")
@@ -70,14 +76,30 @@ def test_version_stands_once():
     assert f"## [{qc.__version__}]" in (ROOT / "CHANGELOG.md").read_text()
 
 
-def test_recipe_has_the_same_dependencies():
+def listed(recipe, key):
+    """Entries of a list of the recipe, variables replaced."""
+    found = re.search(rf"\n( *){key}:\n((?:\1  - .*\n)+)", recipe)[2]
+    python = re.search(r'python_min: "(.*)"', recipe)[1]
+    return {line.replace("${{ python_min }}", python) for line in re.findall(r"- (.*)", found)}
+
+
+def as_conda(requirements):
+    found = (re.fullmatch(r"([\w-]+)(>=.*)", requirement).groups() for requirement in requirements)
+    return {f"{ELSEWHERE.get(name, name)} {bound}" for name, bound in found}
+
+
+def test_recipe_agrees_with_the_project():
     recipe = (ROOT / "docs" / "packaging" / "recipe.yaml").read_text()
-    run = re.search(r"\n  run:\n((?:    - .*\n)*)", recipe)[1]
-    expected = {f"python {PROJECT['requires-python']}"}
-    for requirement in PROJECT["dependencies"]:
-        name, bound = re.fullmatch(r"([\w-]+)(>=.*)", requirement).groups()
-        expected.add(f"{ELSEWHERE.get(name, name)} {bound}")
-    assert set(re.findall(r"- (.*)", run)) == expected
+    python = PROJECT["requires-python"]
+    assert listed(recipe, "run") == {f"python {python}", *as_conda(PROJECT["dependencies"])}
+    assert listed(recipe, "run_constraints") == as_conda(PROJECT["optional-dependencies"]["view"])
+    lowest = python.removeprefix(">=")
+    assert listed(recipe, "host") == {"pip", f"python {lowest}.*", *as_conda(BUILD["requires"])}
+    scripts = {f"{name} = {target}" for name, target in PROJECT["scripts"].items()}
+    assert listed(recipe, "entry_points") == scripts
+    assert re.search(r"summary: (.*)", recipe)[1] == PROJECT["description"]
+    assert re.search(r"license: (.*)", recipe)[1] == PROJECT["license"]
+    assert (ROOT / re.search(r"license_file: (.*)", recipe)[1]).is_file()
 
 
 def test_description_and_readme_hold_on_an_index_page():

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import logging
 import sys
 import warnings
@@ -54,7 +55,7 @@ def _with_values(tokens: list[str]) -> list[str]:
     """The tokens, a --merge that no length follows standing for itself, wherever the file's name stands."""
     return [
         "--merge=true" if token == "--merge" and not _is_number(following) else token
-        for token, following in zip(tokens, [*tokens[1:], ""], strict=True)
+        for token, following in itertools.zip_longest(tokens, tokens[1:], fillvalue="")
     ]
 
 

@@ -126,21 +126,22 @@ def curvature(
     Parameters
     ----------
     mesh
-        File of a mesh of quads, or of quads and other polygons. A grid's array of points (.zarr, .npy, .h5)
-        is read and written block by block, of any size; with --wrap its first row is not repeated.
+        File of a mesh of quads, or of quads and other polygons, or a grid's array of points (.zarr, .npy,
+        .h5), whose first row is not repeated with --wrap. Arrays are read and written block by block, of any
+        size.
     output
         File to write: a mesh with values, or .csv with a row a vertex, in the order of the file's vertices;
-        of an array a new .zarr, .npy or .h5.
+        of an array a new .zarr, .npy or .h5, or one of these.
     scheme
         Of the mean curvature. All other curvatures are its too if it is a jet, else those of "jet".
     value
         Value to write, repeatable; by default all, of an array the mean curvature.
     """
     check_schemes([scheme])
-    if mesh.suffix.lower() in STORES:
+    holders = sorted(suffix for suffix, entry in FORMATS.items() if entry.write and entry.holds_values)
+    if mesh.suffix.lower() in STORES and output.suffix.lower() not in (".csv", *holders):
         say(curvature_of_array(mesh, output, scheme, value, options))
         return
-    holders = sorted(suffix for suffix, entry in FORMATS.items() if entry.write and entry.holds_values)
     check_file(output, "--output", [".csv", *holders])
     wanted = values_of(scheme, value)
     found = load(mesh, options)

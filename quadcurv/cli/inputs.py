@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from quadcurv.cli.options import MeshOptions
 from quadcurv.cli.say import say
-from quadcurv.io.base import SAME_PLACE
+from quadcurv.io.base import SAME_PLACE, STORES
 from quadcurv.io.meshes import PartsError, opened
 from quadcurv.io.seams import closed_grid
 from quadcurv.mesh import QuadGrid, QuadMesh
@@ -66,6 +66,9 @@ def load(path: Path, options: MeshOptions) -> Input:
 
 
 def _read(path: Path, options: MeshOptions) -> Any:
+    store = STORES.get(path.suffix.lower())
+    if store is not None:
+        return QuadGrid(np.asarray(store.open(path)[...]), options.wraps or (False, False))
     try:
         return opened(path, wrap=options.wraps, seams=False)
     except PartsError as error:
