@@ -74,7 +74,6 @@ def cell_ghosts(grid: StaggeredGrid, known: Floats | None = None) -> tuple[Float
     Those of `known` that are not NaN, else by index where the centres are even, else NaN. Second, the cells,
     flat, beside which they are not even.
     """
-    r, c = grid.shape
     x = np.pad(grid.primal, [(1, 1), (1, 1), (0, 0)], constant_values=np.nan)
     rough = np.zeros(grid.shape, bool)
     around, uneven = continued_sides(grid.primal, grid.wrap)

@@ -105,8 +105,7 @@ def as_mesh(mesh: Any, quads: ArrayLike | None = None, wrap: Wrap | None = None)
 def as_mesh_or_chunks(mesh: Any, quads: ArrayLike | None = None, wrap: Wrap | None = None) -> Any:
     """As as_mesh, or a ChunkedGrid of an array that is not in memory."""
     if isinstance(mesh, QuadMesh | QuadGrid | StaggeredGrid):
-        _refuse(quads, wrap, type(mesh).__name__)
-        return mesh
+        return opened(mesh, quads, wrap)
     if isinstance(mesh, ChunkedGrid):
         _refuse(quads, wrap, "ChunkedGrid")
         return mesh
