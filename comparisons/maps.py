@@ -12,8 +12,8 @@ from numpy.typing import ArrayLike
 from comparisons.figures import save_figure
 from quadcurv import viewing
 from quadcurv.comparison import Comparison
-from quadcurv.curvature import dual_areas
 from quadcurv.mesh import Mesh
+from quadcurv.operators import dual_areas
 from quadcurv.tables import write_csv
 
 

@@ -5,15 +5,11 @@ from .boundary import boundary_treatment as boundary_treatment
 from .boundary import one_rings as one_rings
 from .comparison import compare as compare
 from .curvature import curvatures as curvatures
-from .curvature import dual_areas as dual_areas
 from .curvature import evaluate as evaluate
 from .curvature import gaussian_curvature as gaussian_curvature
-from .curvature import laplace_beltrami as laplace_beltrami
-from .curvature import mass_matrix as mass_matrix
 from .curvature import mean_curvature as mean_curvature
 from .curvature import mean_curvature_normal as mean_curvature_normal
 from .curvature import principal_curvatures as principal_curvatures
-from .curvature import stiffness_matrix as stiffness_matrix
 from .curvature import vertex_normals as vertex_normals
 from .io import as_mesh as as_mesh
 from .io import attach as attach
@@ -33,6 +29,10 @@ from .mesh import QuadMesh as QuadMesh
 from .mesh import StaggeredGrid as StaggeredGrid
 from .mesh_quality import quality as quality
 from .mesh_quality import summary as summary
+from .operators import dual_areas as dual_areas
+from .operators import laplace_beltrami as laplace_beltrami
+from .operators import mass_matrix as mass_matrix
+from .operators import stiffness_matrix as stiffness_matrix
 from .refinement import convergence as convergence
 from .repair import as_grid as as_grid
 from .repair import duplicate_points as duplicate_points

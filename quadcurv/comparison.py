@@ -17,11 +17,11 @@ from rich.text import Text
 
 from quadcurv import drivers
 from quadcurv.boundary import checked_boundary, one_rings
-from quadcurv.curvature import dual_areas
 from quadcurv.drivers import direct, fits
 from quadcurv.extras import need
 from quadcurv.io import as_mesh
 from quadcurv.mesh import Mesh
+from quadcurv.operators import dual_areas
 from quadcurv.precision import warn_of_rounding
 from quadcurv.schemes import SCHEMES, Fit, Scheme, as_scheme
 from quadcurv.stencils import Stencils

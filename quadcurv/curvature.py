@@ -1,29 +1,21 @@
-"""The public verbs: one question each, asked of anything that holds a mesh."""
+"""The verbs of curvature: one question each, asked of anything that holds a mesh."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 
-import numpy as np
-import scipy
-from numpy.typing import ArrayLike
-
 from quadcurv import drivers
 from quadcurv.boundary import one_rings
-from quadcurv.drivers import face_parts, parts
-from quadcurv.io import as_mesh, as_mesh_or_chunks
-from quadcurv.mesh import ChunkedGrid, FaceParts, GridBlocks, Mesh, StaggeredGrid
-from quadcurv.precision import warn_of_rounding
-from quadcurv.schemes import Curvatures, Fit, Laplacian, Scheme, SchemeName, as_scheme
+from quadcurv.drivers import parts
+from quadcurv.drivers.dispatch import as_fit, fitted, results, split, taken
+from quadcurv.mesh import ChunkedGrid, GridBlocks
+from quadcurv.schemes import Curvatures, Fit, Scheme, SchemeName, as_scheme
 from quadcurv.schemes.angle_defect import gaussian_curvature as angle_gaussian_curvature
 from quadcurv.types import Floats
 
 DEFAULT = "jet"
 """Scheme of H, K, k1 and k2 where none is named, so that H = (k1 + k2) / 2."""
-
-DEFAULT_MATRIX = "bilinear"
-"""Scheme of matrices and dual areas where none is named: unlike others it sees a checkerboard."""
 
 
 class PrincipalCurvatures(NamedTuple):
@@ -93,14 +85,14 @@ def curvatures(
     >>> bool(np.abs(found.k1 - 0.5).max() < 5e-3)
     True
     """
-    chosen, scale = _as_fit(scheme), None if radius is None else drivers.checked_radius(radius)
-    mesh = _taken(mesh) if scale else parts.in_parts(_taken(mesh), chosen)
+    chosen, scale = as_fit(scheme), None if radius is None else drivers.checked_radius(radius)
+    mesh = taken(mesh) if scale else parts.in_parts(taken(mesh), chosen)
     if isinstance(mesh, ChunkedGrid):
         if scale:
             raise ValueError("radius: means reach beyond the chunks of a grid; give it as one in memory")
         return parts.curvatures(mesh, chosen, boundary)
-    found = _fitted(mesh, chosen, boundary)
-    return _split(mesh, found if scale is None else drivers.averaged(mesh, found, scale))
+    found = fitted(mesh, chosen, boundary)
+    return split(mesh, found if scale is None else drivers.averaged(mesh, found, scale))
 
 
 def principal_curvatures(
@@ -131,14 +123,9 @@ def principal_curvatures(
     >>> bool(np.abs(k1 - 1).max() < 5e-3 and np.abs(k2).max() < 5e-3)
     True
     """
-    chosen = _as_fit(scheme)
-    mesh = parts.in_parts(_taken(mesh), chosen)
-    if isinstance(mesh, ChunkedGrid):
-        return PrincipalCurvatures(*parts.principal_curvatures(mesh, chosen, boundary))
-    found = _fitted(mesh, chosen, boundary)
-    return PrincipalCurvatures(
-        *(_split(mesh, x) for x in (found.k1, found.k2, found.direction1, found.direction2))
-    )
+    names = "k1", "k2", "direction1", "direction2"
+    found = results(mesh, names, as_fit(scheme), boundary)
+    return PrincipalCurvatures(*(found[name] for name in names))
 
 
 def mean_curvature(
@@ -187,17 +174,7 @@ def mean_curvature(
     >>> bool(np.abs(qc.mean_curvature(ball) - 0.5).max() < 5e-3)
     True
     """
-    chosen = as_scheme(scheme)
-    if isinstance(mesh, FaceParts):
-        return face_parts.evaluate(mesh, ["mean_curvature"], chosen, boundary)["mean_curvature"]
-    mesh = parts.in_parts(_taken(mesh), chosen)
-    if isinstance(mesh, ChunkedGrid):
-        return parts.verb(mesh, "mean_curvature", chosen, boundary)
-    if isinstance(chosen, Fit):
-        return _split(mesh, _fitted(mesh, chosen, boundary).mean)
-    H = drivers.run(mesh, chosen, ["mean_curvature"], boundary)["mean_curvature"]
-    warn_of_rounding(mesh, H)
-    return _split(mesh, H)
+    return results(mesh, ["mean_curvature"], as_scheme(scheme), boundary)["mean_curvature"]
 
 
 def mean_curvature_normal(
@@ -229,18 +206,7 @@ def mean_curvature_normal(
     >>> bool((np.einsum("ijx,ijx->ij", Hn, ball.points) < 0).all())
     True
     """
-    chosen = as_scheme(scheme)
-    if isinstance(mesh, FaceParts):
-        return face_parts.evaluate(mesh, ["mean_curvature_normal"], chosen, boundary)["mean_curvature_normal"]
-    mesh = parts.in_parts(_taken(mesh), chosen)
-    if isinstance(mesh, ChunkedGrid):
-        return parts.verb(mesh, "mean_curvature_normal", chosen, boundary)
-    if isinstance(chosen, Fit):
-        fits = _fitted(mesh, chosen, boundary)
-        return _split(mesh, -fits.mean[..., None] * fits.normal)
-    Hn = drivers.run(mesh, chosen, ["mean_curvature_normal"], boundary)["mean_curvature_normal"]
-    warn_of_rounding(mesh, Hn)
-    return _split(mesh, Hn)
+    return results(mesh, ["mean_curvature_normal"], as_scheme(scheme), boundary)["mean_curvature_normal"]
 
 
 def gaussian_curvature(
@@ -274,21 +240,16 @@ def gaussian_curvature(
     >>> bool(np.abs(qc.gaussian_curvature(ball) - 0.25).max() < 5e-3)
     True
     """
-    angles = isinstance(scheme, str) and scheme == "angle_defect"
-    chosen = scheme if angles else _as_fit(scheme)
-    if isinstance(mesh, FaceParts):
-        return face_parts.evaluate(mesh, ["gaussian_curvature"], _as_fit(scheme), boundary)[
-            "gaussian_curvature"
-        ]
-    mesh = parts.in_parts(_taken(mesh), chosen)
+    if not (isinstance(scheme, str) and scheme == "angle_defect"):
+        return results(mesh, ["gaussian_curvature"], as_fit(scheme), boundary)["gaussian_curvature"]
+    mesh = taken(mesh)
     if isinstance(mesh, ChunkedGrid):
-        return parts.verb(mesh, "gaussian_curvature", chosen, boundary)
-    if isinstance(chosen, Fit):
-        return _split(mesh, _fitted(mesh, chosen, boundary).gaussian)
+        return parts.angle_defect(mesh, boundary)
     if drivers.device.holds(mesh):
         raise ValueError("scheme: angle_defect does not run on a device; give it positions in memory")
-    K = angle_gaussian_curvature(one_rings(mesh.mesh if isinstance(mesh, GridBlocks) else mesh, boundary))
-    return _split(mesh, K[: mesh.n] if isinstance(mesh, GridBlocks) else mesh.in_shape(K))
+    if isinstance(mesh, GridBlocks):
+        return split(mesh, angle_gaussian_curvature(one_rings(mesh.mesh, boundary))[: mesh.n])
+    return mesh.in_shape(angle_gaussian_curvature(one_rings(mesh, boundary)))
 
 
 def vertex_normals(mesh: Any, boundary: str = "extrapolate") -> Floats:
@@ -317,166 +278,7 @@ def vertex_normals(mesh: Any, boundary: str = "extrapolate") -> Floats:
     >>> bool(np.abs(qc.vertex_normals(ball) - ball.points).max() < 0.01)
     True
     """
-    return evaluate(mesh, "vertex_normals", boundary=boundary)["vertex_normals"]
-
-
-def dual_areas(mesh: Any, scheme: SchemeName | str | Scheme = DEFAULT_MATRIX) -> Floats:
-    """Area that a scheme gives to each vertex: the diagonal of its mass matrix.
-
-    Parameters
-    ----------
-    mesh, scheme
-        As for :func:`mean_curvature`.
-
-    Returns
-    -------
-    (n,) or (r, c) float64
-        In length^2; 0 at isolated vertices. Boundary vertices have the part inside the mesh. The areas
-        of the bilinear element, Liu's formula and valence 6 add up to the area of the mesh; those of the
-        finite-volume scheme, half the vector area of each ring polygon, do so on quads to second order.
-        Of a staggered grid the area of each cell.
-
-    Raises
-    ------
-    ValueError
-        As for :func:`mean_curvature`; the scheme is a fit.
-
-    Examples
-    --------
-    >>> import numpy as np, quadcurv as qc
-    >>> ball = qc.surfaces.cubed_sphere().sample((24, 24), "faces")[0]
-    >>> round(float(qc.dual_areas(ball).sum() / np.pi), 2)
-    4.0
-    """
-    return evaluate(mesh, "dual_areas", scheme=scheme, boundary="nan")["dual_areas"]
-
-
-def stiffness_matrix(
-    mesh: Any, scheme: SchemeName | str | Scheme = DEFAULT_MATRIX, out: scipy.sparse.csr_array | None = None
-) -> scipy.sparse.csr_array:
-    """Stiffness matrix S; the Laplace-Beltrami operator is -M^-1 S, and H n = -M^-1 S x / 2.
-
-    Parameters
-    ----------
-    mesh, scheme
-        As for :func:`mean_curvature`.
-    out : csr_array, optional
-        The matrix of the same connectivity and scheme at other positions, to be overwritten and returned.
-        For the finite-volume scheme and Liu's formula.
-
-    Returns
-    -------
-    (n, n) csr_array
-        Rows sum to zero; natural boundary conditions, no ghosts; NaN at the vertices of a face without
-        area. Symmetric positive semi-definite but for cotan of valence 4 and 8, and for finite_volume
-        where there are triangles. On quads the finite-volume and Liu's matrix (they are the same) do not
-        see a checkerboard: where vertices can be coloured like a chessboard, the alternating mode lies in
-        the null space beside the constants. The bilinear element has no such mode.
-        Of GridBlocks rows and columns are numbered by their ``numbers``. Of cells (n, p): rows are the n
-        cells, columns the p points of ``stencils().points``.
-
-    Raises
-    ------
-    ValueError
-        As for :func:`mean_curvature`; the scheme is a fit; `out` does not fit.
-
-    Examples
-    --------
-    >>> import numpy as np, quadcurv as qc
-    >>> ball = qc.surfaces.cubed_sphere().sample((8, 8), "faces")[0]
-    >>> S = qc.stiffness_matrix(ball)
-    >>> bool(np.abs(S.sum(axis=1)).max() < 1e-12)
-    True
-    """
-    return drivers.stiffness(_in_memory(mesh), _as_laplacian(scheme), out)
-
-
-def mass_matrix(mesh: Any, scheme: SchemeName | str | Scheme = DEFAULT_MATRIX) -> scipy.sparse.dia_array:
-    """Diagonal mass matrix M of a scheme: its :func:`dual_areas`.
-
-    Parameters
-    ----------
-    mesh, scheme
-        As for :func:`mean_curvature`.
-
-    Returns
-    -------
-    (n, n) dia_array
-
-    Raises
-    ------
-    ValueError
-        As for :func:`mean_curvature`; the scheme is a fit.
-
-    Examples
-    --------
-    >>> import quadcurv as qc
-    >>> ball = qc.surfaces.cubed_sphere().sample((8, 8), "faces")[0]
-    >>> qc.mass_matrix(ball).shape
-    (386, 386)
-    """
-    mesh = _in_memory(mesh)
-    if drivers.device.holds(mesh):
-        return drivers.device.mass_matrix(dual_areas(mesh, scheme))
-    return scipy.sparse.diags_array(mesh.flat(dual_areas(mesh, scheme)))
-
-
-def laplace_beltrami(mesh: Any, f: ArrayLike, scheme: SchemeName | str | Scheme = DEFAULT_MATRIX) -> Floats:
-    """Laplace-Beltrami operator of functions at the vertices, -M^-1 S f.
-
-    Parameters
-    ----------
-    mesh, scheme
-        As for :func:`mean_curvature`, but of a Laplacian.
-    f : (n,) or (n, k) array_like
-        One or several functions; of a grid (r, c) or (r, c, k). Of a staggered grid (p,) or (p, k), at
-        the p points of ``stencils().points``: the cells, then the other points. Of blocks of vertices one
-        array a block, which agree where these meet.
-
-    Returns
-    -------
-    float64 array of the shape of `f`; of a staggered grid (r, c) or (r, c, k)
-        In units of f / length^2, negative at a maximum. NaN where the ring is not closed: what f is
-        beyond a border nobody knows. Where a weak form is solved, take :func:`stiffness_matrix`, which has
-        natural boundary conditions there.
-
-    Raises
-    ------
-    MeshError
-        A ValueError: the mesh is not one.
-    ValueError
-        The scheme is a fit; `f` does not fit the mesh.
-
-    Examples
-    --------
-    On the unit sphere the coordinates are eigenfunctions with eigenvalue -2.
-
-    >>> import numpy as np, quadcurv as qc
-    >>> ball = qc.surfaces.cubed_sphere().sample((24, 24), "faces")[0]
-    >>> found = qc.laplace_beltrami(ball, ball.points, "liu")
-    >>> bool(np.abs(found + 2 * ball.points).mean() < 0.01)
-    True
-    """
-    mesh, chosen = _taken(mesh), _as_laplacian(scheme)
-    if isinstance(mesh, ChunkedGrid):
-        return parts.laplace_beltrami(mesh, f, chosen)
-    if drivers.device.holds(mesh):
-        return drivers.device.laplace_beltrami(mesh, f, chosen)
-    stencils = mesh.stencils()
-    given = mesh.joined(f) if isinstance(mesh, GridBlocks) and not mesh.of_cells else np.asarray(f)
-    if given.dtype.kind not in "biuf":
-        raise ValueError(f"f: expected real numbers, got dtype {given.dtype}")
-    given = given.astype(np.float64, copy=False)
-    if drivers.has_holes(mesh):
-        if given.shape[:2] != mesh.shape:
-            raise ValueError(f"f: shape {given.shape}, expected {mesh.shape} or {(*mesh.shape, 'k')}")
-        return mesh.in_shape(drivers.apply(mesh.to_mesh(), chosen, mesh.flat(given)))
-    lead = (len(stencils.points),) if isinstance(mesh, StaggeredGrid | GridBlocks) else stencils.shape
-    if given.shape[: len(lead)] != lead or given.ndim > len(lead) + 1:
-        raise ValueError(f"f: shape {given.shape}, expected {lead} or {(*lead, 'k')}")
-    values = given.reshape(len(stencils.points), *given.shape[len(lead) :])
-    result = drivers.apply(mesh, chosen, values)
-    return _split(mesh, result.reshape(*stencils.shape, *values.shape[1:]))
+    return results(mesh, ["vertex_normals"], as_scheme("finite_volume"), boundary)["vertex_normals"]
 
 
 def evaluate(
@@ -493,13 +295,12 @@ def evaluate(
     ----------
     mesh, boundary
         As for :func:`mean_curvature`.
-    *wanted : {"mean_curvature", "mean_curvature_normal", "vertex_normals", "dual_areas"}
-        Names of verbs.
-    scheme : str or Laplacian
-        A fit gives none of these; :func:`curvatures` has what it gives. Of a :class:`ChunkedGrid` it may be a
-        fit, which gives "mean_curvature", "mean_curvature_normal", "gaussian_curvature", "k1", "k2",
-        "direction1", "direction2", "normal", "standard_error" (r, c, 4) of H, K, k1 and k2, "noise",
-        "degree" and "rings".
+    *wanted : str
+        "mean_curvature", "mean_curvature_normal", "vertex_normals" or "dual_areas"; of a fit
+        "mean_curvature", "mean_curvature_normal", "gaussian_curvature", "k1", "k2", "direction1",
+        "direction2", "normal", "standard_error" and "interval" (..., 4) of H, K, k1 and k2, "noise",
+        "degree", "rings" and "feature".
+    scheme : str or Scheme
     out : mapping from name to float64 array, optional
         C-contiguous arrays of the shape of the result, to be written to. Others are allocated. Of a
         :class:`ChunkedGrid` anything that takes slices, such as a zarr array or a ``numpy.memmap``.
@@ -524,55 +325,4 @@ def evaluate(
     >>> sorted(qc.evaluate(ball, "mean_curvature", "dual_areas"))
     ['dual_areas', 'mean_curvature']
     """
-    chosen = as_scheme(scheme)
-    if isinstance(mesh, FaceParts):
-        return face_parts.evaluate(mesh, wanted, chosen, boundary, out)
-    mesh = _taken(mesh)
-    if isinstance(mesh, ChunkedGrid):
-        return parts.evaluate(mesh, wanted, chosen, boundary, out, progress)
-    found = drivers.run(mesh, _as_laplacian(chosen), wanted, boundary, out)
-    return {name: _split(mesh, values) for name, values in found.items()}
-
-
-def _in_memory(mesh: Any) -> Any:
-    """What a matrix is asked of, as the drivers take it."""
-    return mesh if isinstance(mesh, GridBlocks) else as_mesh(mesh)
-
-
-def _taken(mesh: Any) -> Any:
-    """What a verb is asked of, as the drivers take it; grids that are not in memory, too."""
-    return mesh if isinstance(mesh, GridBlocks) else as_mesh_or_chunks(mesh)
-
-
-def _split(mesh: Any, values: Any) -> Any:
-    """Results as a verb gives them: of blocks (n, ...) as one array, or Curvatures, a block."""
-    if not isinstance(mesh, GridBlocks):
-        return values
-    if not isinstance(values, Curvatures):
-        return mesh.split(values)
-    return tuple(
-        drivers.each(values, lambda x, k=k: mesh.split(x)[k])  # type: ignore[misc]
-        for k in range(len(mesh))
-    )
-
-
-def _fitted(mesh: Mesh | GridBlocks, scheme: Fit, boundary: str) -> Curvatures:
-    found = drivers.fit(mesh, scheme, boundary)
-    warn_of_rounding(mesh, found.mean)
-    return found
-
-
-def _as_laplacian(scheme: str | Scheme) -> Laplacian:
-    scheme = as_scheme(scheme)
-    if isinstance(scheme, Fit):
-        raise ValueError(f"scheme: {scheme.name} is a fit, which has no stiffness matrix and no dual areas")
-    return scheme
-
-
-def _as_fit(scheme: str | Scheme) -> Fit:
-    scheme = as_scheme(scheme)
-    if isinstance(scheme, Laplacian):
-        raise ValueError(
-            f"scheme: {scheme.name} gives the mean curvature alone; a fit is needed, such as 'jet'"
-        )
-    return scheme
+    return results(mesh, wanted, as_scheme(scheme), boundary, out, progress)

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import warnings
 from typing import Any
 
 import numpy as np
 
 from quadcurv.device_arrays import is_on_device, on_host, taken
 from quadcurv.mesh import GridBlocks, Mesh, QuadGrid, QuadMesh, StaggeredGrid
-from quadcurv.types import Floats, Indices, PrecisionWarning
+from quadcurv.types import Floats, Indices, PrecisionWarning, warn
 
 _SAMPLE = 512  # of the edges, whose lengths are looked at
 _NOTED = 0.01  # of the mean curvature
@@ -67,10 +66,10 @@ def warn_of_rounding(mesh: Mesh | GridBlocks, H: Floats) -> None:
     PrecisionWarning
         With the figure.
     """
-    warn_of_error(*rounding_error(mesh), mesh.roundoff, H, 5)
+    warn_of_error(*rounding_error(mesh), mesh.roundoff, H)
 
 
-def warn_of_error(error: float, extent: float, roundoff: float, H: Floats, level: int) -> None:
+def warn_of_error(error: float, extent: float, roundoff: float, H: Floats) -> None:
     """The same of an error that is known, with some of the values of H."""
     if error * extent < _NOTED:  # most meshes: nothing of H needs to be looked at
         return
@@ -78,12 +77,11 @@ def warn_of_error(error: float, extent: float, roundoff: float, H: Floats, level
     known = np.abs(H[np.isfinite(H)])
     typical = max(float(np.median(known)) if known.size else 0.0, 1 / extent)
     if error >= _NOTED * typical:
-        warnings.warn(
+        warn(
             f"positions are rounded to {2 * roundoff:.1e} of their size, which causes errors of about "
             f"{error:.1g} (1/length) in H, where H is about {typical:.1g}: move the mesh near the origin "
             "and give double precision, or smooth more",
             PrecisionWarning,
-            stacklevel=level,
         )
 
 

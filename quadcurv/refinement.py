@@ -14,8 +14,9 @@ from rich.console import Console
 from rich.table import Table
 
 from quadcurv.comparison import NORMS, Evaluation, norms, schemes_of
-from quadcurv.curvature import dual_areas, gaussian_curvature, principal_curvatures
+from quadcurv.curvature import gaussian_curvature, principal_curvatures
 from quadcurv.extras import need
+from quadcurv.operators import dual_areas
 from quadcurv.schemes import Scheme
 from quadcurv.surfaces import SURFACES, Surface
 from quadcurv.tables import as_html, as_latex, by_column, finite, progress, short, text_table, write_csv

@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import os
+import sys
+import warnings
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -55,3 +59,11 @@ class PrecisionWarning(MeshWarning):
     >>> said[0].category.__name__
     'PrecisionWarning'
     """
+
+
+def warn(message: str, kind: type[UserWarning] = MeshWarning) -> None:
+    """A warning that names the line of the user's that led here."""
+    package, level, frame = os.path.dirname(__file__), 1, sys._getframe(0)
+    while frame.f_back is not None and frame.f_code.co_filename.startswith(package):
+        frame, level = frame.f_back, level + 1
+    warnings.warn(message, kind, stacklevel=level)

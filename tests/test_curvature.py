@@ -17,6 +17,7 @@ from quadcurv import (
     QuadMesh,
     StaggeredGrid,
     curvature,
+    operators,
     surfaces,
 )
 from quadcurv.precision import rounding_error
@@ -39,7 +40,7 @@ def test_one_default_scheme_for_all_curvatures():
 
 def test_matrices_have_one_default_scheme_too():
     mesh = surfaces.cubed_sphere().sample((6, 6), "faces")[0]
-    default = curvature.DEFAULT_MATRIX
+    default = operators.DEFAULT_MATRIX
     assert abs(qc.stiffness_matrix(mesh) - qc.stiffness_matrix(mesh, default)).max() == 0
     np.testing.assert_array_equal(qc.mass_matrix(mesh).diagonal(), qc.dual_areas(mesh, default))
 
@@ -269,6 +270,29 @@ MESH = QuadMesh(
         )
     )
 )
+
+
+@pytest.mark.parametrize("kind", ["grid", "faces", "staggered"])
+@pytest.mark.parametrize("scheme", ["jet", "jet-2", "liu"])
+def test_evaluate_gives_what_the_verbs_give(kind, scheme):
+    mesh = surfaces.torus().sample((12, 10), kind)[0]
+    fit = scheme != "liu"
+    verbs = {"mean_curvature": qc.mean_curvature, "mean_curvature_normal": qc.mean_curvature_normal}
+    if fit:
+        verbs["gaussian_curvature"] = qc.gaussian_curvature
+    shape = verbs["mean_curvature"](mesh, scheme).shape
+    out = {"mean_curvature": np.empty(shape)}
+    found = qc.evaluate(mesh, *verbs, scheme=scheme, out=out)
+    assert found["mean_curvature"] is out["mean_curvature"]
+    for name, verb in verbs.items():
+        assert np.array_equal(found[name], verb(mesh, scheme))
+    if fit:
+        all_ = qc.curvatures(mesh, scheme)
+        found = qc.evaluate(mesh, "standard_error", "degree", scheme=scheme)
+        assert np.array_equal(found["standard_error"], np.stack(all_.standard_error, axis=-1), equal_nan=True)
+        assert np.array_equal(found["degree"], all_.degree)
+    with pytest.raises(ValueError, match=f"wanted: expected some of .* as {scheme} gives, got 'torsion'"):
+        qc.evaluate(mesh, "torsion", scheme=scheme)
 
 
 @pytest.mark.parametrize(

@@ -26,7 +26,7 @@ FLOORS = [
     ["boundary", "io", "precision"],
     ["repair", "schemes"],
     ["drivers"],
-    ["curvature", "mesh_quality"],
+    ["curvature", "mesh_quality", "operators"],
     ["curves", "estimate", "surfaces", "tables"],
     ["comparison"],
     ["refinement"],

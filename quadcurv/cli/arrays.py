@@ -8,10 +8,10 @@ from pathlib import Path
 
 from quadcurv.cli.options import MeshOptions, check_file
 from quadcurv.curvature import evaluate
-from quadcurv.drivers import direct, tasks
+from quadcurv.drivers import answers
 from quadcurv.io.base import STORES
 from quadcurv.mesh import ChunkedGrid
-from quadcurv.schemes import Fit, as_scheme
+from quadcurv.schemes import as_scheme
 
 
 def curvature_of_array(
@@ -21,11 +21,7 @@ def curvature_of_array(
     if options != MeshOptions(wrap=options.wrap, boundary=options.boundary):
         raise ValueError(f"{path}: an array is taken as it is; --merge, --join and --orient are for meshes")
     chosen, names = as_scheme(scheme), list(dict.fromkeys(wanted or ["mean_curvature"]))
-    fitted = isinstance(chosen, Fit)
-    shapes = {n: s for n, (s, _) in tasks.FITTED.items()} if fitted else direct.PER_VERTEX
-    for name in names:
-        if name not in shapes:
-            raise ValueError(f"--value: {scheme} gives {', '.join(shapes)} of an array, not {name}")
+    shapes = answers.shapes(chosen, names, "--value")
     check_file(output, "--output", list(STORES))
     if output.exists():
         raise FileExistsError(17, "exists already; arrays are written to new files", str(output))
@@ -34,7 +30,7 @@ def curvature_of_array(
     lead = tuple(int(n) for n in points.shape[:-3])
     try:
         out = STORES[output.suffix.lower()].create(
-            output, {name: lead + grid.shape + shapes[name] for name in names}
+            output, {name: lead + grid.shape + shape for name, shape in shapes.items()}
         )
         evaluate(grid, scheme=chosen, boundary=options.boundary, out=out, progress=True)
     except BaseException:

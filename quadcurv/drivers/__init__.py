@@ -11,14 +11,15 @@ import scipy
 
 from quadcurv.boundary import checked_boundary, one_rings
 from quadcurv.drivers import blocks, compiled, device, direct, fits
+from quadcurv.drivers.answers import shapes
 from quadcurv.drivers.averages import averaged, checked_radius
 from quadcurv.drivers.fits import each
 from quadcurv.mesh import GridBlocks, Mesh, QuadGrid, QuadMesh, StaggeredGrid
-from quadcurv.schemes import Curvatures, Fit, Laplacian
+from quadcurv.schemes import Curvatures, Fit, Laplacian, Scheme
 from quadcurv.stencils import Stencils
 from quadcurv.types import Floats
 
-__all__ = ["apply", "averaged", "checked_radius", "each", "fit", "has_holes", "run", "stiffness"]
+__all__ = ["apply", "arrays", "averaged", "checked_radius", "each", "fit", "has_holes", "run", "stiffness"]
 
 
 # The quads of a staggered grid cover it twice, once for its cells and once for their corners: so that the
@@ -53,7 +54,7 @@ def run(
     if device.holds(mesh):
         return device.evaluate(mesh, scheme, wanted, boundary, out)  # type: ignore[arg-type]
     checked_boundary(boundary)
-    results = _arrays(mesh, wanted, {} if out is None else out)
+    results = arrays(mesh, scheme, wanted, out)
     if isinstance(mesh, GridBlocks):
         blocks.evaluate(mesh, scheme, boundary, results)
     elif has_holes(mesh):
@@ -67,9 +68,8 @@ def run(
         compiled.evaluate_grid(mesh, scheme, boundary, results)
     if _of_cells(mesh) and "dual_areas" in results:
         results["dual_areas"] *= _CELLS
-    one = mesh.mesh if isinstance(mesh, GridBlocks) and not mesh.of_cells else mesh
-    if mesh.roundoff > DOUBLE and not has_holes(mesh) and not isinstance(one, GridBlocks):
-        far = run(far_away(one, mesh.roundoff, size), scheme, results.keys() - {"dual_areas"}, boundary)
+    if (coarse := _coarse(mesh)) is not None:
+        far = run(far_away(coarse, mesh.roundoff, size), scheme, results.keys() - {"dual_areas"}, boundary)
         for name, values in far.items():
             results[name][np.isnan(values)] = np.nan
     return results
@@ -110,7 +110,18 @@ def stiffness(
         matrix = assembled(mesh.stencils())
     if _of_cells(mesh):
         matrix.data *= _CELLS
+    if (coarse := _coarse(mesh)) is not None:
+        matrix.data[np.isnan(stiffness(far_away(coarse, mesh.roundoff), scheme).data)] = np.nan
     return matrix
+
+
+def _coarse(mesh: Mesh | GridBlocks) -> Mesh | None:
+    """The one mesh whose positions are rounded more coarsely than numbers are here, if there is one."""
+    if mesh.roundoff <= DOUBLE or has_holes(mesh):
+        return None
+    if isinstance(mesh, GridBlocks):
+        return None if mesh.of_cells else mesh.mesh
+    return mesh
 
 
 def _of_cells(mesh: Mesh | GridBlocks) -> bool:
@@ -134,18 +145,19 @@ def has_holes(mesh: Mesh | GridBlocks) -> TypeGuard[QuadGrid]:
     return isinstance(mesh, QuadGrid) and mesh.mask is not None
 
 
-def _arrays(mesh: Mesh | GridBlocks, wanted: Iterable[str], out: Mapping[str, Floats]) -> dict[str, Floats]:
+def arrays(
+    mesh: Mesh | GridBlocks, scheme: Scheme, wanted: Iterable[str], out: Mapping[str, Floats] | None = None
+) -> dict[str, Floats]:
     """The caller's arrays, which kernels will write to without looking again, or new ones."""
+    out = {} if out is None else out
     if not isinstance(out, Mapping):
         raise ValueError(f"out: expected a mapping from names to arrays, got {type(out).__name__}")
     if isinstance(mesh, GridBlocks) and out:
         raise ValueError("out: blocks have an array each, which are new ones")
     shape = (len(mesh.points),) if isinstance(mesh, QuadMesh) else mesh.shape
     results: dict[str, Floats] = {}
-    for name in dict.fromkeys((*wanted, *out)):
-        if name not in direct.PER_VERTEX:
-            raise ValueError(f"wanted: expected some of {', '.join(direct.PER_VERTEX)}, got {name!r}")
-        full = shape + direct.PER_VERTEX[name]
+    for name, one in shapes(scheme, (*wanted, *out)).items():
+        full = shape + one
         if name not in out:
             results[name] = np.empty(full)
             continue

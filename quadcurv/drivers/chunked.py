@@ -31,11 +31,10 @@ from quadcurv.drivers.windows import (
     ranges,
     taken,
 )
-from quadcurv.io.base import warn
 from quadcurv.mesh import ChunkedGrid
 from quadcurv.mesh.grid import refuse_repetition
 from quadcurv.precision import error_at_edges, sample, warn_of_error
-from quadcurv.types import Floats, MeshError
+from quadcurv.types import Floats, MeshError, warn
 
 _MOST = 2**20  # vertices of a block
 _MOST_SMALL = 2**16  # where each takes much memory
@@ -93,7 +92,7 @@ class _Sample:
         """Say what rounding costs."""
         begin, end = (np.concatenate(x) for x in zip(*self.found, strict=True))
         H = np.concatenate(self.H) if self.H else np.empty(0)
-        warn_of_error(*error_at_edges(begin, end, roundoff), roundoff, H, 7)
+        warn_of_error(*error_at_edges(begin, end, roundoff), roundoff, H)
 
 
 def evaluate(

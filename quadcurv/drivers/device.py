@@ -14,7 +14,7 @@ import numpy as np
 
 from quadcurv.boundary import REACH, checked_boundary, closed, poles
 from quadcurv.device_arrays import as_cupy, is_on_device, on_host, taken
-from quadcurv.drivers import compiled, direct
+from quadcurv.drivers import answers, compiled, direct
 from quadcurv.mesh import QuadGrid, QuadMesh
 from quadcurv.schemes import Fit, Laplacian, Scheme
 from quadcurv.stencils import Stencils
@@ -58,7 +58,7 @@ def evaluate(
     checked_boundary(boundary)
     checked_scheme(scheme)
     assert scheme.fast is not None
-    results = _arrays(mesh, wanted, {} if out is None else out)
+    results = _arrays(mesh, scheme, wanted, {} if out is None else out)
     if isinstance(mesh, QuadMesh):
         _evaluate_faces(mesh, scheme, boundary, results)
     else:
@@ -202,15 +202,15 @@ def _empty(shape: Any, dtype: Any = np.float64) -> Any:
     return cupy.empty(shape, dtype)
 
 
-def _arrays(mesh: QuadMesh | QuadGrid, wanted: Iterable[str], out: Mapping[str, Any]) -> dict[str, Any]:
+def _arrays(
+    mesh: QuadMesh | QuadGrid, scheme: Laplacian, wanted: Iterable[str], out: Mapping[str, Any]
+) -> dict[str, Any]:
     """The caller's arrays, or new ones, as `drivers` has them."""
     import cupy
 
     shape, results = evaluate_shape(mesh), {}
-    for name in dict.fromkeys((*wanted, *out)):
-        if name not in direct.PER_VERTEX:
-            raise ValueError(f"wanted: expected some of {', '.join(direct.PER_VERTEX)}, got {name!r}")
-        full = shape + direct.PER_VERTEX[name]
+    for name, one in answers.shapes(scheme, (*wanted, *out)).items():
+        full = shape + one
         if name not in out:
             results[name] = _empty(full)
             continue

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from quadcurv.drivers import chunked, lazy, tasks
+from quadcurv.drivers import answers, chunked, lazy, tasks
 from quadcurv.mesh import ChunkedGrid, QuadGrid
 from quadcurv.schemes import Curvatures, Fit, Scheme, StandardErrors
 
@@ -34,13 +34,13 @@ def evaluate(
 ) -> dict[str, Any]:
     """Several results in one pass."""
     names = dict.fromkeys((*wanted, *(out if isinstance(out, Mapping) else ())))
-    return _run(grid, _task(scheme, names), boundary, out, progress)
+    look = not names.keys().isdisjoint(("mean_curvature", "mean_curvature_normal", "k1"))
+    return _run(grid, _task(scheme, names), boundary, out, progress, look)
 
 
-def verb(grid: ChunkedGrid, name: str, scheme: Scheme | str, boundary: str) -> Any:
-    """One result, with a warning where rounding shows in it."""
-    task = tasks.angle_defect() if isinstance(scheme, str) else _task(scheme, [name])
-    return _run(grid, task, boundary, look_at_rounding=not isinstance(scheme, str))[name]
+def angle_defect(grid: ChunkedGrid, boundary: str) -> Any:
+    """Gaussian curvature by angles."""
+    return _run(grid, tasks.angle_defect(), boundary)["gaussian_curvature"]
 
 
 def curvatures(grid: ChunkedGrid, scheme: Fit, boundary: str) -> Curvatures:
@@ -48,7 +48,7 @@ def curvatures(grid: ChunkedGrid, scheme: Fit, boundary: str) -> Curvatures:
     left_out = (
         {"mean_curvature_normal"} if scheme.pooled else {"mean_curvature_normal", "interval", "feature"}
     )
-    names = [name for name in tasks.FITTED if name not in left_out]
+    names = [name for name in answers.FITTED if name not in left_out]
     found = _run(grid, _task(scheme, names), boundary, look_at_rounding=True)
     arrays: dict[str, Any] = dict(found)
     for name in ("standard_error", "interval"):
@@ -59,13 +59,6 @@ def curvatures(grid: ChunkedGrid, scheme: Fit, boundary: str) -> Curvatures:
     if "feature" in found:
         arrays["feature"] = found["feature"] > 0
     return Curvatures(arrays.pop("mean_curvature"), arrays.pop("gaussian_curvature"), **arrays)
-
-
-def principal_curvatures(grid: ChunkedGrid, scheme: Fit, boundary: str) -> tuple[Any, ...]:
-    """k1, k2 and their directions."""
-    names = "k1", "k2", "direction1", "direction2"
-    found = _run(grid, _task(scheme, names), boundary, look_at_rounding=True)
-    return tuple(found[name] for name in names)
 
 
 def laplace_beltrami(grid: ChunkedGrid, f: Any, scheme: Any) -> Any:

@@ -9,34 +9,16 @@ from typing import Any
 import numpy as np
 
 from quadcurv.boundary import one_rings
-from quadcurv.drivers import DOUBLE, apply, compiled, direct, far_away, fits, has_holes, run
+from quadcurv.drivers import DOUBLE, answers, apply, compiled, far_away, fits, has_holes, run
 from quadcurv.drivers.windows import Window
 from quadcurv.mesh import QuadGrid, StaggeredGrid
 from quadcurv.mesh.chunked import part
-from quadcurv.schemes import Curvatures, Diamond, Fit, Laplacian, StandardErrors
+from quadcurv.schemes import Diamond, Fit, Laplacian
 from quadcurv.schemes.angle_defect import gaussian_curvature
 from quadcurv.stencils import Frame
 from quadcurv.types import Floats
 
 Into = Mapping[str, Floats]
-
-FITTED: dict[str, tuple[tuple[int, ...], Callable[[Curvatures], Any]]] = {
-    "mean_curvature": ((), lambda found: found.mean),
-    "mean_curvature_normal": ((3,), lambda found: -found.mean[..., None] * found.normal),
-    "gaussian_curvature": ((), lambda found: found.gaussian),
-    "k1": ((), lambda found: found.k1),
-    "k2": ((), lambda found: found.k2),
-    "direction1": ((3,), lambda found: found.direction1),
-    "direction2": ((3,), lambda found: found.direction2),
-    "normal": ((3,), lambda found: found.normal),
-    "standard_error": ((4,), lambda found: _stacked(found.standard_error, found.mean)),
-    "interval": ((4,), lambda found: _stacked(found.interval, found.mean)),
-    "noise": ((), lambda found: found.noise),
-    "degree": ((), lambda found: found.degree),
-    "rings": ((), lambda found: found.rings),
-    "feature": ((), lambda found: np.zeros(found.mean.shape) if found.feature is None else found.feature),
-}
-"""What a fit gives by name, and the shape of one vertex's answer."""
 
 
 @dataclass(frozen=True)
@@ -73,10 +55,7 @@ class Task:
 
 def laplacian(scheme: Laplacian, wanted: Iterable[str]) -> Task:
     """Mean curvatures, normals and areas of a scheme with a stiffness matrix."""
-    names = list(dict.fromkeys(wanted))
-    for name in names:
-        if name not in direct.PER_VERTEX:
-            raise ValueError(f"wanted: expected some of {', '.join(direct.PER_VERTEX)}, got {name!r}")
+    names = answers.shapes(scheme, wanted)
 
     def write(window: Window, boundary: str | None, into: Into) -> None:
         grid = window.grid
@@ -96,15 +75,12 @@ def laplacian(scheme: Laplacian, wanted: Iterable[str]) -> Task:
             found = run(grid, scheme, names, boundary or "nan", size=window.size)
         _put(window, found, into)
 
-    return Task({name: direct.PER_VERTEX[name] for name in names}, 1, write, small=scheme.fast is None)
+    return Task(names, 1, write, small=scheme.fast is None)
 
 
 def fit(scheme: Fit, wanted: Iterable[str]) -> Task:
     """Whatever a fit gives."""
-    names = list(dict.fromkeys(wanted))
-    for name in names:
-        if name not in FITTED:
-            raise ValueError(f"wanted: expected some of {', '.join(FITTED)}, got {name!r}")
+    names = answers.shapes(scheme, wanted)
     if scheme.reach is None:
         raise ValueError(
             f"scheme: {scheme.name} looks at all of a grid at once, which is read block by block; "
@@ -125,10 +101,9 @@ def fit(scheme: Fit, wanted: Iterable[str]) -> Task:
         found = fits.fit_around(around, scheme)
         if has_holes(grid):
             found = fits.each(found, grid.in_shape)
-        _put(window, {name: FITTED[name][1](found) for name in names}, into)
+        _put(window, {name: answers.FITTED[name][1](found) for name in names}, into)
 
-    shapes = {name: FITTED[name][0] for name in names}
-    return Task(shapes, scheme.reach, write, small=True, depth=3 + scheme.pooled, scaled=True)
+    return Task(names, scheme.reach, write, small=True, depth=3 + scheme.pooled, scaled=True)
 
 
 def angle_defect() -> Task:
@@ -163,10 +138,6 @@ def laplace_beltrami(scheme: Laplacian, f: Any) -> Task:
         _put(window, found, into)
 
     return Task({"laplace_beltrami": more}, 1, write, (f,), small=True)
-
-
-def _stacked(errors: StandardErrors | None, like: Floats) -> Floats:
-    return np.full((*like.shape, 4), np.nan) if errors is None else np.stack(errors, axis=-1)
 
 
 def with_holes(task: Task) -> Task:

@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import os
-import sys
-import warnings
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -15,7 +12,7 @@ from numpy.typing import NDArray
 
 from quadcurv.mesh import QuadMesh
 from quadcurv.ragged import Faces
-from quadcurv.types import Bools, Indices, Ints, MeshError, MeshWarning
+from quadcurv.types import Bools, Indices, Ints, MeshError
 
 SAME_PLACE = 1e-6  # of the extent of a mesh: single precision is what many files have
 
@@ -270,11 +267,3 @@ def checked_values(name: str, values: NDArray[Any], shape: tuple[int, ...]) -> N
     if values.shape not in (shape, (*shape, 3)):
         raise MeshError(f"{name}: shape {values.shape}, expected {shape} or {(*shape, 3)}")
     return values
-
-
-def warn(message: str, kind: type[MeshWarning] = MeshWarning) -> None:
-    """A warning that names the line of the user's that led here."""
-    package, level, frame = os.path.dirname(os.path.dirname(__file__)), 1, sys._getframe(0)
-    while frame.f_back is not None and frame.f_code.co_filename.startswith(package):
-        frame, level = frame.f_back, level + 1
-    warnings.warn(message, kind, stacklevel=level)

@@ -9,12 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from quadcurv.io import trimesh as adapter
-from quadcurv.io.base import Content, Format, Values, register, warn
+from quadcurv.io.base import Content, Format, Values, register
 from quadcurv.io.colours import viridis
 from quadcurv.io.isolation import isolated
 from quadcurv.io.quads import quads_by_order
 from quadcurv.mesh import QuadMesh
-from quadcurv.types import MeshError, PrecisionWarning
+from quadcurv.types import MeshError, PrecisionWarning, warn
 
 COARSE = 1e-3  # of an edge: rounding by more is said
 KNOWN = "_known"  # ends the name of the values that tell where others are known: glTF has no NaN

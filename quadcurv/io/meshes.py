@@ -13,12 +13,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from quadcurv.io.base import FORMATS, STORES, Content, checked_values, joined, library, warn
+from quadcurv.io.base import FORMATS, STORES, Content, checked_values, joined, library
 from quadcurv.io.quads import quads_by_order
 from quadcurv.io.replacing import replacing
 from quadcurv.io.seams import closed_grid, warn_of_open_sides, warn_of_seam
 from quadcurv.mesh import ChunkedGrid, GridBlocks, Mesh, QuadGrid, QuadMesh, Recovery, StaggeredGrid
-from quadcurv.types import MeshError
+from quadcurv.types import MeshError, warn
 
 Wrap = Sequence[bool]
 TRIANGULATED = (".obj", ".off", ".ply", ".stl")  # formats in which trimesh writes quads as triangles

@@ -15,11 +15,11 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from quadcurv.io.base import Content, FaceList, Format, Values, polygons, register, warn
+from quadcurv.io.base import Content, FaceList, Format, Values, polygons, register
 from quadcurv.io.colours import viridis
 from quadcurv.io.text import numbers, runs
 from quadcurv.mesh import QuadMesh
-from quadcurv.types import Indices, MeshError, PrecisionWarning
+from quadcurv.types import Indices, MeshError, PrecisionWarning, warn
 
 CODES = {
     **dict.fromkeys(("char", "int8"), "b"),

@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 from quadcurv.checks import checked_wrap
 from quadcurv.coincidence import first_at_place
 from quadcurv.device_arrays import is_on_device
-from quadcurv.io.base import SAME_PLACE, warn
+from quadcurv.io.base import SAME_PLACE
 from quadcurv.mesh import QuadGrid, QuadMesh, StaggeredGrid
-from quadcurv.types import Floats, MeshError
+from quadcurv.types import Floats, MeshError, warn
 
 _NAMES = "rows", "columns"
 _SAMPLES = 16  # points a direction that tell the extent of a grid

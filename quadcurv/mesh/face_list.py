@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -16,7 +15,7 @@ from quadcurv.checks import Finding, Report, checked_points, unit_roundoff
 from quadcurv.connectivity import Connectivity, connect
 from quadcurv.device_arrays import on_host
 from quadcurv.stencils import Stencils
-from quadcurv.types import Floats, Indices, Ints, MeshWarning
+from quadcurv.types import Floats, Indices, Ints, warn
 
 
 class Recovery(NamedTuple):
@@ -228,4 +227,4 @@ def warn_of(findings: Sequence[Finding]) -> None:
     """Say once what was mended, above the one who made the mesh."""
     said = Report(findings).warning
     if said:
-        warnings.warn(said, MeshWarning, stacklevel=3)
+        warn(said)

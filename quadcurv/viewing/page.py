@@ -5,7 +5,6 @@ from __future__ import annotations
 import base64
 import html
 import json
-import warnings
 from dataclasses import dataclass
 from importlib.resources import files
 from math import floor, log10
@@ -17,7 +16,7 @@ from numpy.typing import ArrayLike, DTypeLike, NDArray
 
 from quadcurv.comparison import Comparison
 from quadcurv.io.replacing import replacing
-from quadcurv.types import Floats
+from quadcurv.types import Floats, warn
 from quadcurv.viewing.fields import FIELDS, Fields
 from quadcurv.viewing.geometry import OVERLAYS, thinned, viewpoint
 from quadcurv.viewing.scale import BARS, NAN_COLOUR, ZERO_COLOUR, Field
@@ -118,10 +117,10 @@ def _fewer_on_all(fields: Fields, first: Field, field: str, fixed: int) -> dict[
     size += one * len(arrays)
     if left_out:
         beyond = "" if size <= LIMIT else f", and it still takes {size / 1e6:.0f} MB"
-        warnings.warn(
+        warn(
             f"a page with all fields of {n} vertices would take more than {LIMIT / 1e6:.0f} MB: without "
             f"{', '.join(left_out)}{beyond}; Style(thin=True), or --thin, shows all on fewer vertices",
-            stacklevel=5,
+            UserWarning,
         )
     in_order = [found[name] for name in fields.names if name in found]
     return geometry | {"fields": in_order, "arrays": _as_text(arrays)}
