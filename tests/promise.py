@@ -5,9 +5,10 @@ every finite value the error must be within
 
     10 E + explained
 
-where E is the largest error that the scheme has on the undamaged mesh, and `explained` is what the damage
-accounts for, vertex by vertex (see each damage); or the value is NaN; or a PrecisionWarning was given; or the
-mesh was refused, with an error that says why. Run as a program it tries as many cases as asked for:
+where E is the largest error that the scheme has on the undamaged mesh within four cells, and `explained` is
+what the damage accounts for, vertex by vertex (see each damage); or the value is NaN; or a PrecisionWarning
+was given; or the mesh was refused, with an error that says why. Run as a program it tries as many cases as
+asked for:
 
     python -m tests.promise 100000
 """
@@ -39,7 +40,7 @@ SURFACES = (
     "enneper",
     "tanh_sheet",
 )
-LOCAL = 8.0  # times the largest principal curvature: what vertices of a damaged face may be off by
+NEAR = 4  # cells within which a fit may see what the undamaged mesh is off by
 
 
 @dataclass
@@ -99,17 +100,29 @@ def sample(name: str, n: int) -> Sample:
 
 
 @cache
-def undamaged_error(name: str, n: int, scheme: str) -> float:
+def undamaged_error(name: str, n: int, scheme: str) -> np.ndarray:
+    """(r, c): the largest error within `NEAR` cells."""
     s = sample(name, n)
-    # What "auto" chooses depends on the mesh: a vertex off the surface makes it choose smoother fits.
-    others = [undamaged_error(name, n, "jet-2")] if scheme == "jet-auto" else []
     H = qc.mean_curvature(qc.QuadGrid(s.points, s.surface.wrap), scheme)
-    return max(float(np.nanmax(np.abs(H - s.H))), *others, 0.0)
+    return windows(np.abs(H - s.H), s.surface.wrap, NEAR).max(axis=(2, 3))
+
+
+def windows(values: np.ndarray, wrap, reach: int) -> np.ndarray:
+    """(r, c, 2 reach + 1, 2 reach + 1): what is around each place of a grid."""
+    for axis, wraps in enumerate(wrap):
+        pad = [(reach, reach) if a == axis else (0, 0) for a in (0, 1)]
+        values = np.pad(values, pad, mode="wrap" if wraps else "edge")
+    return np.lib.stride_tricks.sliding_window_view(values, (2 * reach + 1,) * 2)
 
 
 @cache
 def gain(name: str, n: int, scheme: str) -> float:
-    """Standard deviation of H for noise of size 1: the largest of any vertex inside, by a few samples."""
+    """Standard deviation of H for noise of size 1: the largest of any vertex inside, by a few samples.
+
+    A fit that chooses for itself must do no worse than a quadric over one ring, which no noise makes better.
+    """
+    if scheme in ("jet", "jet-auto"):
+        return gain(name, n, "jet-2")
     s, rng = sample(name, n), np.random.default_rng(0)
     size = 1e-7 * s.edge
 
@@ -151,7 +164,7 @@ def steps(t):
 
 
 def jitter(s, rng):
-    """Vertices moved within the surface by 5 to 20 % of the spacing: Laplacians are off by that part of k."""
+    """Vertices moved within the surface by 5 to 20 % of the spacing: Laplacians are off by parts of k."""
     part = rng.choice([0.05, 0.1, 0.2])
     moved = Sample(
         s.surface,
@@ -159,7 +172,7 @@ def jitter(s, rng):
         s.eta + part * rng.uniform(-1, 1, s.xi.shape) * np.abs(s.eta[0, 1] - s.eta[0, 0]),
     )
     return Damaged(
-        moved.points, lambda x: qc.QuadGrid(x, s.surface.wrap), moved.H, explained=20 * part * s.bend
+        moved.points, lambda x: qc.QuadGrid(x, s.surface.wrap), moved.H, explained=10 * part * s.bend
     )
 
 
@@ -171,7 +184,7 @@ def noise(s, rng):
 
 
 def uneven_border(s, rng):
-    """First cells 0.3 to 2 times as wide as the others: an error of first order where the spacing jumps."""
+    """First cells 0.3 to 2 times as wide as the others: some of first order where the spacing jumps."""
     ratio, axis = rng.uniform(0.3, 2), rng.integers(2)
     if s.surface.wrap[axis]:
         axis = 1 - axis
@@ -185,7 +198,7 @@ def uneven_border(s, rng):
         moved.points,
         lambda x: qc.QuadGrid(x, s.surface.wrap),
         moved.H,
-        explained=5 * s.bend**2 * s.edge,
+        explained=0.1 * s.bend**2 * s.edge,
     )
 
 
@@ -202,8 +215,11 @@ def inner_face(s, rng):
     return faces, next(k for k, f in enumerate(faces) if set(f) == set(corners)), (i, j)
 
 
-def with_vertex(s, rng, where):
-    """A quad cut into triangles about a further vertex at a place (u, v) within it, 0 to 1."""
+def with_vertex(s, rng, where, off):
+    """A quad cut into triangles about a further vertex at a place (u, v) within it, 0 to 1.
+
+    What is explained is so much over the shortest side of the quad, at vertices within two faces.
+    """
     faces, k, (i, j) = inner_face(s, rng)
     u, v = where
     xi = s.xi[i, j] + u * (s.xi[i + 1, j] - s.xi[i, j])
@@ -214,15 +230,15 @@ def with_vertex(s, rng, where):
     points = np.vstack((s.points.reshape(-1, 3), s.surface.mapping(xi, eta)))
     H = np.append(s.H.ravel(), s.surface.mean_curvature(xi, eta))
     sides = points[quad] - points[np.roll(quad, 1)]
-    local = max(LOCAL * s.bend, 2 / np.linalg.norm(sides, axis=1).min())
+    local = off / np.linalg.norm(sides, axis=1).min()
     explained = np.where(near(faces, [*quad, new], H.size, 2), local, 0.0)
     return Damaged(points, lambda x: qc.QuadMesh(x, faces), H, explained)
 
 
 def needle(s, rng):
-    """A vertex 1e-12 to 1e-2 of an edge beside another one: its neighbours are off by as much as k."""
+    """A vertex 1e-12 to 1e-2 of an edge beside another one: Laplacians are off by some k around it."""
     d = 10.0 ** rng.uniform(-12, -2)
-    return with_vertex(s, rng, (d, d))
+    return with_vertex(s, rng, (d, d), 1.0)
 
 
 def cap(s, rng):
@@ -230,7 +246,7 @@ def cap(s, rng):
 
     At its vertices H is then of the size of 1 / edge.
     """
-    return with_vertex(s, rng, (rng.uniform(0.3, 0.7), 10.0 ** rng.uniform(-12, -2)))
+    return with_vertex(s, rng, (rng.uniform(0.3, 0.7), 10.0 ** rng.uniform(-12, -2)), 2.0)
 
 
 def hanging_node(s, rng):
@@ -242,7 +258,7 @@ def hanging_node(s, rng):
     flat = s.points.reshape(-1, 3)
     points = np.vstack((flat, (flat[a] + flat[b]) / 2))
     H = np.append(s.H.ravel(), (s.H.ravel()[a] + s.H.ravel()[b]) / 2)
-    explained = np.where(near(faces, [*faces[k]], H.size, 2), LOCAL * s.bend, 0.0)
+    explained = np.where(near(faces, [*faces[k]], H.size, 2), s.bend, 0.0)
     return Damaged(points, lambda x: qc.QuadMesh(x, faces), H, explained)
 
 
@@ -252,7 +268,7 @@ def collapsed(s, rng):
     a, b, c, d = faces[k]
     faces[k] = [a, b, c, c]
     faces.append([a, c, d, d])
-    explained = np.where(near(faces, [a, b, c, d], s.xi.size, 2), LOCAL * s.bend, 0.0)
+    explained = np.where(near(faces, [a, b, c, d], s.xi.size, 2), 0.1 * s.bend, 0.0)
     return Damaged(s.points.reshape(-1, 3), lambda x: qc.QuadMesh(x, faces), s.H.ravel(), explained)
 
 
@@ -282,15 +298,15 @@ def fin(s, rng):
     points = np.vstack((flat, flat[[a, b]] + up))
     faces.append([b, a, n, n + 1])
     H = np.append(s.H.ravel(), [np.nan, np.nan])  # of the fin's own vertices there is no exact H
-    explained = np.where(near(faces, [a, b], n + 2, 2), 0.2 * s.bend, 0.0)
+    explained = np.where(near(faces, [a, b], n + 2, 2), 0.05 * s.bend, 0.0)
     return Damaged(points, lambda x: qc.QuadMesh(x, faces), H, explained)
 
 
 def hole(s, rng):
     """Holes in a grid, masked or NaN: borders, on fitted surfaces where too few points are between two.
 
-    Such surfaces tell the curvature of the points near: see `one_sided`. They are at borders up to five faces
-    from a hole; nearer, fits are one-sided too.
+    Such surfaces tell the curvature of the points near: see `one_sided`. They are in two rows at
+    borders up to five faces from a hole; nearer, fits are one-sided too.
     """
     points, hidden = s.points, np.zeros(s.xi.shape, bool)
     r, c = hidden.shape
@@ -303,8 +319,8 @@ def hole(s, rng):
     border = np.zeros(hidden.shape, bool)
     for axis, wraps in enumerate(s.surface.wrap):
         if not wraps:
-            np.moveaxis(border, axis, 0)[[0, -1]] = True
-    beside, near_it = (near_hidden(hidden, s.surface.wrap, k) for k in (2, 5))
+            np.moveaxis(border, axis, 0)[[0, 1, -2, -1]] = True
+    beside, near_it = (windows(hidden, s.surface.wrap, k).any(axis=(2, 3)) for k in (2, 5))
     explained = np.where(beside | (border & near_it), one_sided(s), 0.0)
     return Damaged(given, lambda x: qc.QuadGrid(x, s.surface.wrap, mask=mask), s.H, explained)
 
@@ -314,34 +330,21 @@ def one_sided(s):
 
     And (k edge)^2 of the curvature k, where it does not vary.
     """
-    reach, off = 3, np.zeros(s.xi.shape)
+    off = np.zeros(s.xi.shape)
     for k in s.surface.principal_curvatures(s.xi, s.eta):
-        pads = [(reach, reach)] * 2
-        around = np.pad(np.broadcast_to(k, s.xi.shape), pads, mode="edge")
-        for axis, wraps in enumerate(s.surface.wrap):
-            if wraps:
-                around = np.moveaxis(around, axis, 0)
-                around[:reach], around[-reach:] = around[-2 * reach : -reach], around[reach : 2 * reach]
-                around = np.moveaxis(around, 0, axis)
-        windows = np.lib.stride_tricks.sliding_window_view(around, (2 * reach + 1,) * 2)
-        off = np.maximum(off, np.abs(windows - k[..., None, None]).max(axis=(2, 3)))
+        around = windows(np.broadcast_to(k, s.xi.shape), s.surface.wrap, 3)
+        off = np.maximum(off, np.abs(around - k[..., None, None]).max(axis=(2, 3)))
     return 2 * off + (s.bend * s.edge) ** 2 * s.bend
 
 
-def near_hidden(hidden, wrap, reach):
-    """Mask of the points of a grid within `reach` rows and columns of hidden ones."""
-    for axis, wraps in enumerate(wrap):
-        pad = [(reach, reach) if a == axis else (0, 0) for a in (0, 1)]
-        padded = np.pad(hidden, pad, mode="wrap" if wraps else "constant")
-        windows = np.lib.stride_tricks.sliding_window_view(padded, 2 * reach + 1, axis)
-        hidden = windows.any(axis=-1)
-    return hidden
-
-
 def single_precision(s, rng):
-    """Positions in single precision: eps |x| / h^2."""
+    """Positions in single precision: eps |x| / h^2, and more beside borders, where it looks rough."""
     least = min(np.linalg.norm(np.diff(s.points, axis=a), axis=-1).min() for a in (0, 1))
-    explained = 4 * np.finfo(np.float32).eps * np.abs(s.points).max() / least**2
+    beside = np.ones(s.xi.shape)
+    for axis, wraps in enumerate(s.surface.wrap):
+        if not wraps:
+            np.moveaxis(beside, axis, 0)[[0, 1, -2, -1]] = 30
+    explained = beside * 4 * np.finfo(np.float32).eps * np.abs(s.points).max() / least**2
     return Damaged(
         s.points, lambda x: qc.QuadGrid(x.astype(np.float32), s.surface.wrap), s.H, explained=explained
     )
@@ -368,7 +371,7 @@ def repeated_row(s, rng):
 
 
 def pole(s, rng):
-    """A sphere to its poles, rows of one point but for rounding: right beside the pole, there to 20 %."""
+    """A sphere to its poles, rows of one point but for rounding: right beside the pole, there to 5 %."""
     n = s.xi.shape[0]
     p, t = np.meshgrid(
         np.linspace(0, np.pi, n), np.linspace(0, 2 * np.pi, 2 * n, endpoint=False), indexing="ij"
@@ -378,7 +381,7 @@ def pole(s, rng):
     H = np.ones(p.shape)
     if rng.random() < 0.5:
         x, wrap, H = x.swapaxes(0, 1)[::-1], (True, False), H.T
-    explained = np.full(H.shape, 0.2)
+    explained = np.full(H.shape, 0.05)
     return Damaged(x, lambda x: qc.QuadGrid(x, wrap), H, explained)
 
 
@@ -423,8 +426,11 @@ def verdict(seed: int) -> tuple[str, str]:
     if not np.array_equal(points, before, equal_nan=True):
         return "changed", what
     error = np.abs(H * scale - damaged.H)
-    own = "sphere" if damage is pole else name
-    allowed = 10 * undamaged_error(own, n, scheme) + damaged.explained + 1e-9
+    own = undamaged_error("sphere" if damage is pole else name, n, scheme)
+    if own.shape != error.shape:  # further vertices, behind the others
+        own = np.append(own, np.full(max(error.size - own.size, 0), own.max()))
+        own = own.reshape(error.shape) if own.size == error.size else own.max()
+    allowed = 10 * own + damaged.explained + 1e-9
     if damaged.noise:
         allowed = allowed + by_noise(s, scheme, damaged.noise)
     wrong = np.isfinite(error) & (error > allowed)

@@ -116,7 +116,9 @@ def test_borders_of_cells_are_as_near_as_the_inside(name, damage, amount, scheme
 @pytest.mark.parametrize(("damage", "amount"), DAMAGES)
 @pytest.mark.parametrize("name", SURFACES)
 def test_all_borders_of_cells_are_as_near_as_the_inside(name, damage, amount, scheme):
-    as_near_as_inside(*damaged_cells(name, 32, damage, amount), scheme)
+    # Some are nearly exact inside a catenoid, whose cells are three times as long around as along.
+    bound = 3.5 if name == "catenoid" else 3.0
+    as_near_as_inside(*damaged_cells(name, 32, damage, amount), scheme, bound)
 
 
 @pytest.mark.slow

@@ -221,12 +221,13 @@ def bent(twist: Floats, a: Floats, b: Floats) -> Floats:
 
 
 def regular_stars(stencils: Stencils, surfaces: Surfaces) -> Stars:
-    """Four quads on each surface, with edges as long as the distance of the first ring."""
+    """Four quads on each surface, with edges half as long as the distance of the first ring."""
     first = surfaces.ring == 1
     near = surfaces.flat(stencils.points[surfaces.around])
     size = np.linalg.norm(near, axis=2).sum(axis=1, where=first) / np.maximum(first.sum(axis=1), 1)
     x, y = np.meshgrid([-1.0, 0, 1], [-1.0, 0, 1], indexing="ij")
-    local = size[:, None, None] * np.stack((x.ravel(), y.ravel()), axis=1)
+    # The smaller they are the less a scheme is off; noise is in the surface already.
+    local = size[:, None, None] / 2 * np.stack((x.ravel(), y.ravel()), axis=1)
     points = surfaces.lifted(local)[:, [4, 0, 1, 2, 3, 5, 6, 7, 8]]
     points[:, 0] = surfaces.points
     index = np.array([[1, 2, 3], [4, 0, 5], [6, 7, 8]])
