@@ -33,6 +33,7 @@ class QuadCurvature(VTKPythonAlgorithmBase):
         self._scheme = _SCHEMES.index("jet")
         self._boundary = 0
         self._all = 1
+        self._bars = 0
 
     @smproperty.xml(
         '<IntVectorProperty name="Scheme" command="SetScheme" number_of_elements="1" '
@@ -61,6 +62,16 @@ class QuadCurvature(VTKPythonAlgorithmBase):
     def SetAllCurvatures(self, number: int) -> None:
         """Choose whether a jet's K, k1 and k2 are written beside H."""
         self._set("_all", number)
+
+    @smproperty.xml(
+        '<IntVectorProperty name="ErrorBars" label="Error Bars" command="SetErrorBars" '
+        'number_of_elements="1" default_values="0"><BooleanDomain name="bool"/>'
+        "<Documentation>Half widths of 95 % intervals, and creases, by jet and jet-auto.</Documentation>"
+        "</IntVectorProperty>"
+    )
+    def SetErrorBars(self, number: int) -> None:
+        """Choose whether half widths of the intervals of "jet" and "jet-auto", and creases, are written."""
+        self._set("_bars", number)
 
     def _set(self, name: str, number: int) -> None:
         if getattr(self, name) != number:
@@ -101,11 +112,15 @@ class QuadCurvature(VTKPythonAlgorithmBase):
         """Arrays by name, in the order of the points."""
         mesh, in_vtk_order = _mesh(given)
         scheme, boundary = _SCHEMES[self._scheme], ("extrapolate", "nan")[self._boundary]
-        if isinstance(qc.SCHEMES[scheme], qc.Fit) and self._all:
-            found = qc.curvatures(mesh, scheme, boundary)
-            by_name = {"H": found.mean, "K": found.gaussian, "k1": found.k1, "k2": found.k2}
-        else:
+        if not isinstance(qc.SCHEMES[scheme], qc.Fit):
             by_name = {"H": qc.mean_curvature(mesh, scheme, boundary)}
+        else:
+            found = qc.curvatures(mesh, scheme, boundary)
+            kinds = {"H": "mean", "K": "gaussian", "k1": "k1", "k2": "k2"} if self._all else {"H": "mean"}
+            by_name = {name: getattr(found, kind) for name, kind in kinds.items()}
+            if self._bars and found.interval is not None and found.feature is not None:
+                by_name |= {f"{name} interval": getattr(found.interval, kind) for name, kind in kinds.items()}
+                by_name["crease"] = found.feature.astype(np.int32)
         return {name: in_vtk_order(values) for name, values in by_name.items()}
 
 

@@ -101,5 +101,8 @@ def test_the_paper_cites_what_it_lists_and_names_files_that_exist():
     paper, listed = ((DOCS / name).read_text(encoding="utf-8") for name in ("paper.md", "paper.bib"))
     cited = set(re.findall(r"@(\w+)", paper))
     assert cited == set(re.findall(r"@\w+\{(\w+),", listed))
+    peers = (DOCS.parent / "comparisons" / "PEERS.md").read_text(encoding="utf-8")
+    assert ("sixteen kinds of meshes" in paper) == ("Mean errors on 16 meshes" in peers)
+    assert "first on 16 of 16" not in peers  # "which is not always `quadcurv`"
     for name in re.findall(r"`(comparisons/[\w./]+)`", paper):
         assert (DOCS.parent / name).exists(), name

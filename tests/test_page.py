@@ -436,3 +436,17 @@ def test_page_in_a_notebook(ellipsoid):
     frame = page._repr_html_()
     assert frame.startswith('<iframe srcdoc="&lt;!doctype html&gt;')
     assert frame.count('"') == 10  # quotes of the page do not end its own
+
+
+def test_page_in_a_frame_is_drawn_and_logs_no_error(browser, ellipsoid, tmp_path):
+    """A frame of a notebook has no address of its own and may run scripts alone."""
+    path = tmp_path / "notebook.html"
+    path.write_text(f"<!doctype html><body>{viewing.html_page(ellipsoid)._repr_html_()}", encoding="utf-8")
+    frame = Page(browser, path)
+    browser.save_screenshot(str(tmp_path / "frame.png"))
+    assert coloured(pixels(tmp_path / "frame.png")).mean() > 0.05
+    browser.switch_to.frame(0)
+    frame.all("#overlays")[0].click()
+    assert [p.text for p in frame.all("#legend .below")] == ["valence < 4"]
+    browser.switch_to.default_content()
+    assert browser.get_log("browser") == []

@@ -52,10 +52,19 @@ def run(tmp_path):
 
 
 def test_polygons(run):
-    found, _ = run(PLANE + "f = QuadCurvature(Input=bent)\nf.UpdatePipeline()\nprint(json.dumps(arrays(f)))")
-    assert set(found) >= {"H", "K", "k1", "k2"}
+    script = "f = QuadCurvature(Input=bent, ErrorBars={})\nf.UpdatePipeline()\nprint(json.dumps(arrays(f)))"
+    found, _ = run(PLANE + script.format(0))
+    curvatures, bars = (
+        {"H", "K", "k1", "k2"},
+        {"H interval", "K interval", "k1 interval", "k2 interval", "crease"},
+    )
+    assert set(found) & (curvatures | bars) == curvatures
     assert [abs(end) for end in found["H"]] == pytest.approx([0.25, 0.25], abs=1e-4)
     assert found["K"] == pytest.approx([0, 0], abs=1e-4)
+    found, _ = run(PLANE + script.format(1))
+    assert set(found) >= curvatures | bars
+    assert 0 <= found["H interval"][0] <= found["H interval"][1] < 1e-3
+    assert found["crease"] == [0, 0]
 
 
 def test_structured_grids_and_schemes(run):
