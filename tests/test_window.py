@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import json
 import os
 import shutil
@@ -17,6 +18,7 @@ from maps import needs_opengl, on_ellipsoid
 from PIL import ImageGrab
 
 from quadcurv import viewing
+from quadcurv.viewing.window import BUTTON, SLIDER, button_places
 
 
 @pytest.fixture(scope="module")
@@ -116,23 +118,33 @@ def screen():
     for program in ("Xvfb", "xdotool"):
         if shutil.which(program) is None:
             pytest.skip(f"not installed: {program}")
-    for _ in range(10):
-        server, number = started_server()
+    # Numbers by process: servers that look for a free one at the same time, or end meanwhile, take the same.
+    for number in range(1000 + 10 * (os.getpid() % 5000), 60000, 7):
+        server, display = started_server(number)
         with ended(server):
-            if number:
-                yield f":{number}"
+            if display and has_screen(f":{display}"):
+                yield f":{display}"
                 return
-    raise AssertionError("no screen in ten attempts")
+    raise AssertionError("no screen")
 
 
-def started_server():
-    """An X server and the number of its display, empty where another one took that at the same time."""
+def started_server(number):
+    """An X server and the number of its display once it is ready, empty where it is not to be had."""
     read, write = os.pipe()
-    command = ["Xvfb", "-displayfd", str(write), "-screen", "0", "1700x700x24", "-nolisten", "tcp"]
-    server = subprocess.Popen(command, pass_fds=[write], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    options = ["-displayfd", str(write), "-screen", "0", "1700x700x24", "-nolisten", "tcp"]
+    quiet = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
+    server = subprocess.Popen(["Xvfb", f":{number}", *options], pass_fds=[write], **quiet)
     os.close(write)
     with os.fdopen(read) as pipe:
         return server, pipe.readline().strip()
+
+
+def has_screen(display):
+    """Whether a program can draw there."""
+    environment = os.environ | {"DISPLAY": display}
+    return not subprocess.run(
+        ["xdotool", "getdisplaygeometry"], env=environment, capture_output=True
+    ).returncode
 
 
 @pytest.fixture
@@ -246,6 +258,17 @@ def test_the_slider_refines(window):
     state = window.becomes(vertices=128**2)
     assert state["shown"] == ["edges", "overlays"]
     assert state["picked"] is None
+
+
+@pytest.mark.parametrize("width", [400, 560, 800, 1600])
+@pytest.mark.parametrize("slider", [True, False])
+def test_buttons_and_slider_stand_apart_in_windows_of_any_width(width, slider):
+    """What is clicked lies within the window, and no two of it on one another."""
+    places = button_places(width, 6, slider)
+    assert places[0] >= 0
+    for left, right in itertools.pairwise(places):
+        assert left + BUTTON + 8 < right
+    assert places[-1] + BUTTON < (SLIDER[0] * width if slider else width)
 
 
 LARGE_WINDOW = """

@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 
 HISTOGRAM = 0.1  # its height to that of a view
 _LEGEND_HEIGHT = 120.0  # pixels, at scale 1
+_LETTER = 1.0  # pixels that a letter is wide, to the size of its type
 _PATCHES, _ROWS = 0.42, 3  # part of the legend's width for patches side by side; else they stand in rows
 
 
@@ -147,9 +148,12 @@ class Scene:
         in_rows = step * len(patches) > _PATCHES  # else
         columns = -(-len(patches) // _ROWS) if in_rows else len(patches)
         step = 135 * self.scale / width if in_rows else step
-        left, right = 0.08, 0.92 - step * columns - 0.02 * in_rows
+        left = max(0.08, 30 * self.scale / width)  # for half of the first label
+        right = min(1 - left, 1 - 0.5 * step) - step * columns - 0.02 * in_rows
         self.strip(np.linspace(left, right, 257), table.values[:, :3])
-        self.text(field.title, ((left + right) / 2, 0.82), 11)
+        middle = (left + right) / 2
+        fits = 2 * middle * width / (_LETTER * self.scale * len(field.title))
+        self.text(field.title, (middle, 0.82), min(11, fits))
         for place, label in field.ticks():
             self.text(label, (left + (place - low) / (high - low) * (right - left), 0.2), 10)
         for i, (label, colour) in enumerate(patches):

@@ -34,6 +34,7 @@ PANEL, HEADING, LEGEND, CONTROLS = 400, 44, 120, 95  # pixels: side of a view, h
 SCREEN = 1600, 700  # pixels that the views of a window may take
 VALUES = "values"  # name of the coloured array
 _SCALE = 1.5  # pixels of a picture to one of a window
+_LEAST = 0.75  # scale, below which letters cannot be read
 _LARGE = 20_000  # faces; beyond that edges hide the colours, and a window draws what turns coarsely
 _COARSE = 32  # cells of a coarse surface along the longest side
 RING_COLOUR = "#cc3399"
@@ -264,7 +265,7 @@ class View:
                 wide = PANEL * max(ceil(views / rows), 2)
                 return min(size[0] / wide, high / (PANEL * rows + around))
 
-            scale = max(map(scaled, range(1, views + 1)))
+            scale = max(_LEAST, *map(scaled, range(1, views + 1)))
         self._area = size[0], size[1] - controls - around * scale  # pixels of all views
         rows, self._columns = _grid(panels, self._area)
         heights = [HEADING * scale] * self._heads + [self._area[1] / rows] * rows + [LEGEND * scale]

@@ -10,7 +10,9 @@ from quadcurv.comparison import Comparison
 from quadcurv.viewing.style import Style
 from quadcurv.viewing.views import View
 
-_COLOUR = "#0072b2"
+_COLOUR, _ARROW = "#0072b2", "→"
+_NARROW = 80  # pixels a button, where its key has to do for a label
+BUTTON, SLIDER = 26, (0.75, 0.97)  # pixels of a button; ends of the slider, parts of the width
 _SWITCHES = {"edges": "m", "overlays": "o", "normals": "n", "directions": "d", "histogram": "h"}  # and keys
 
 
@@ -58,16 +60,19 @@ def _add_buttons(view: View) -> None:
             button.GetRepresentation().SetState(what in view.shown)
 
     buttons = [
-        ("next field (→)", "Right", None),
+        (f"next field ({_ARROW})", "Right", None),
         *((f"{what} ({key})", key, what) for what, key in _SWITCHES.items()),
     ]
-    for i, (label, key, what) in enumerate(buttons):
+    places = button_places(width, len(buttons), view.refined is not None)
+    narrow = places[1] - places[0] < _NARROW
+    for x, (label, key, what) in zip(places, buttons, strict=True):
         action = view.next_field if what is None else partial(toggle, what)
-        x = 35 + 95 * i
+        if narrow:
+            label = key if what else _ARROW
         button = plotter.add_checkbox_button_widget(
             lambda _, action=action: action(),
             position=(x, 30),
-            size=26,
+            size=BUTTON,
             border_size=2,
             color_on=_COLOUR,
             color_off=_COLOUR if what is None else "white",
@@ -81,13 +86,20 @@ def _add_buttons(view: View) -> None:
     show_state()
 
 
+def button_places(width: float, number: int, slider: bool) -> list[float]:
+    """Left edges of buttons in a window of some width, in pixels, beside a slider or alone."""
+    room = SLIDER[0] * width if slider else width
+    step = min(95.0, (room - 10) / number)
+    return [min(35.0, step - BUTTON) + step * i for i in range(number)]
+
+
 def _add_slider(view: View) -> None:
     slider = view.plotter.add_slider_widget(
         view.refine,
         rng=(0, view.LEVELS - 1),
         value=view.START,
-        pointa=(0.75, 0.42),
-        pointb=(0.97, 0.42),
+        pointa=(SLIDER[0], 0.42),
+        pointb=(SLIDER[1], 0.42),
         fmt="%.0f",
         color=_COLOUR,
         slider_width=0.1,
