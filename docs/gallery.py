@@ -51,10 +51,10 @@ class Pictures:
             scene.close()
         plotters._ALL_PLOTTERS.clear()
         for value in block_vars["example_globals"].values():
-            if not isinstance(value, Figure) or getattr(value, "number", None) in plt.get_fignums():
-                continue  # the scraper of matplotlib sees to what pyplot holds
-            if not any(value is figure for figure in self._seen):
-                self._seen.append(value)
+            if not isinstance(value, Figure) or any(value is figure for figure in self._seen):
+                continue
+            self._seen.append(value)
+            if getattr(value, "number", None) not in plt.get_fignums():  # which matplotlib's scraper sees to
                 paths.append(next(block_vars["image_path_iterator"]))
                 value.savefig(paths[-1], dpi=150, bbox_inches="tight")
         return figure_rst(paths, gallery_conf["src_dir"])

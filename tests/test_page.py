@@ -450,3 +450,17 @@ def test_page_in_a_frame_is_drawn_and_logs_no_error(browser, ellipsoid, tmp_path
     assert [p.text for p in frame.all("#legend .below")] == ["valence < 4"]
     browser.switch_to.default_content()
     assert browser.get_log("browser") == []
+
+
+def test_titles_have_room_above_low_views(browser, ellipsoid, tmp_path):
+    viewing.save_maps(ellipsoid, tmp_path / "low.html", "mean_curvature")
+    page = Page(browser, tmp_path / "low.html", "size=900,260&show=")
+    for picture, view in zip(page.pictures(tmp_path / "low.png"), page.all("#views > div"), strict=True):
+        title = view.find_elements("css selector", "span")[0].rect
+        assert title["height"] > 10
+        assert coloured(picture).mean() > 0.02
+    screen = pixels(tmp_path / "low.png")
+    for view in page.all("#views > div"):
+        box, title = view.rect, view.find_elements("css selector", "span")[0].rect
+        rows = slice(int(title["y"]), int(title["y"] + title["height"]))
+        assert not coloured(screen[rows, int(box["x"]) : int(box["x"] + box["width"])]).any()

@@ -130,15 +130,17 @@ function look(towards, up) {
 }
 
 function camera(box) {                      // column-major, parallel projection
-  const aspect = box.width / box.height, room = element("histogram").checked;
-  const unitY = radius / zoom * Math.max(1 / 0.86, 1 / 0.94 / aspect) * (room ? 0.86 / 0.76 : 1);
+  const aspect = box.width / box.height;
+  const top = Math.min((1.5 * parseFloat(views.style.fontSize || 15) + 6) / box.height, 0.4);  // for the title
+  const bottom = element("histogram").checked ? 0.12 : 0.03;
+  const unitY = radius / zoom * Math.max(1 / (1 - top - bottom), 1 / 0.94 / aspect);
   const scale = [1 / (unitY * aspect), 1 / unitY, -1 / (4 * radius)];
   const m = new Float32Array(16);
   axes.forEach((a, k) => {
     for (let i = 0; i < 3; i++) m[4 * i + k] = scale[k] * a[i];
     m[12 + k] = -scale[k] * dot(a, centre) + (k < 2 ? shift[k] : 0);
   });
-  m[13] -= room ? -0.04 : 0.06;             // the title takes the upper edge, a histogram the lower
+  m[13] -= top - bottom;
   m[15] = 1;
   return m;
 }
