@@ -145,12 +145,22 @@ grids = {n: qc.QuadGrid(torus(n), (True, True)) for n in (large, small, few)}
 given = {n: (torus(n).reshape(-1, 3), faces(n)) for n in (large, few)}
 mesh = qc.QuadMesh(*given[large])
 points, Hn, jet = given[large][0], qc.mean_curvature_normal, qc.principal_curvatures
+def sheet(n):
+    x, y = np.meshgrid(*[np.linspace(-1, 1, n)] * 2, indexing="ij")
+    return np.stack([x, y, x * y], axis=-1)
+sheets = {n: sheet(n) for n in (large, small)}
+cells = qc.StaggeredGrid(sheets[large][1:-1:2, 1:-1:2], sheets[large][:-1:2, :-1:2])
+quartic = qc.schemes.jet(4)
 jobs = {
     "finite_volume, grid": lambda: Hn(grids[large], "finite_volume"),
     "finite_volume, small grid": lambda: Hn(grids[small], "finite_volume"),
-    "liu, open grid": lambda: Hn(qc.QuadGrid(grids[large].points), "liu"),
+    "liu, open grid": lambda: Hn(qc.QuadGrid(sheets[large]), "liu"),
+    "liu, small open grid": lambda: Hn(qc.QuadGrid(sheets[small]), "liu"),
+    "finite_volume, staggered grid": lambda: Hn(cells, "finite_volume"),
     "finite_volume, one call": lambda: Hn(given[large], "finite_volume"),
     "finite_volume, repeated": lambda: Hn(mesh.with_points(points), "finite_volume"),
+    "jet(4), grid": lambda: jet(grids[few], quartic),
+    "jet(4), one call": lambda: jet(given[few], quartic),
     "jet, grid": lambda: jet(grids[few], "jet"),
     "jet, one call": lambda: jet(given[few], "jet"),
     "stiffness": lambda: qc.stiffness_matrix(mesh, "finite_volume"),
@@ -225,4 +235,6 @@ def beside(old: Path, count: int, sizes: tuple[int, int, int]) -> Iterator[Ratio
                 else sizes[0]
             )
             share = _quartiles(taken[:, 0] / taken[:, 1])
-            yield Ratio(f"{job}, warm", "the other checkout", n * n, 1, *share, 1.03, 1.0)
+            # The default fit chooses at every vertex what the one of 0.1 had fixed: jet(4) is that one.
+            goal = () if job.startswith("jet,") else (1.03, 1.0)
+            yield Ratio(f"{job}, warm", "the other checkout", n * n, 1, *share, *goal)
