@@ -22,9 +22,12 @@ _SAMPLES = 16  # points a direction that tell the extent of a grid
 def warn_of_seam(mesh: QuadMesh) -> None:
     """Say so where boundary vertices coincide."""
     stencils = mesh.stencils()
-    rim = np.flatnonzero(~stencils.closed & (stencils.valence > 0))
+    rim = np.flatnonzero(~stencils.closed)
     if not rim.size:
         return
+    of_faces = np.zeros(stencils.n + 1, bool)  # the last one for the marks of triangles, -1
+    of_faces[stencils.faces] = True
+    rim = rim[of_faces[rim]]
     points = mesh.points[rim]
     first = first_at_place(points, SAME_PLACE * float(np.ptp(mesh.points, axis=0).max()))
     doubled = first != np.arange(len(rim))
