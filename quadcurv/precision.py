@@ -100,7 +100,7 @@ def _edges(mesh: Mesh) -> tuple[Indices, Indices]:
     if isinstance(mesh, QuadMesh):
         faces = mesh.faces[:: len(mesh.faces) // _SAMPLE + 1].astype(np.int64)
         return faces[:, [0, 1]].ravel(), faces[:, [1, 2]].ravel()
-    r, c = mesh.shape
+    r, c = _points(mesh).shape[:2]
     i, j = sample(r, c)
     first = i * c + j
     first = np.concatenate((first - c * (i == r - 1), first - (j == c - 1)))
