@@ -38,7 +38,6 @@ from quadcurv.kernels.vector import (
     dot,
     known_ring_square,
     known_square,
-    larger,
     less,
     middle,
     place,
@@ -76,17 +75,6 @@ def beside_right(planes, p, a, b, i):
 def diagonals(corners):
     """From the second corner to the first, from the fourth to the third."""
     return less(corners[0], corners[1]), less(corners[2], corners[3])
-
-
-@formula
-def load_dual(planes, to, dual, at, width, far):
-    """As `load_row`."""
-    most = Carried((far,))
-    for k in span(0, width):
-        point = triple(dual, at + 3 * k, 1)
-        place(planes, to + k, Y, point)
-        most.set((larger(most.get()[0], bits(dot(point, point))),))
-    return most.get()[0]
 
 
 @formula
@@ -226,7 +214,8 @@ def _pass(points, size, beyond, beside, dual, liu, Hn, H, normal, area, start, s
             far = load_row(planes, to, points, beyond, inside, first + 3 * begin, width, far)
             far = load_ends(planes, to, points, beyond, beside, inside, first, begin, end, c, row, rows, far)
             if i >= start:
-                far = load_dual(planes, b + FIRST, dual, 3 * ((c + 1) * i + begin), width + 1, far)
+                at = 3 * ((c + 1) * i + begin)
+                far = load_row(planes, b + FIRST, dual, dual, True, at, width + 1, far)
             if i == start:
                 first_fluxes(planes, p, q, b, part, width)
             elif i > start:
