@@ -148,11 +148,12 @@ def roughness(mesh: Stencils) -> Floats:
 
 
 def _normals(mesh: Stencils) -> tuple[Floats, Floats]:
-    """Unit normals, and the sine of the angle by which they turn along or across the faces around."""
+    """Unit normals; of border vertices the sine of the angle by which they turn along or across faces."""
     size = np.linalg.norm(mesh.ring_areas, axis=1, keepdims=True)
     normals = np.divide(mesh.ring_areas, size, out=np.zeros_like(mesh.ring_areas), where=size > 0)
     turn = np.zeros(mesh.n)
     faces = np.where(mesh.faces < 0, mesh.faces[:, :1], mesh.faces)
+    faces = faces[~mesh.closed[faces].all(axis=1)]
     for step in (1, 2):
         other = np.roll(faces, step, axis=1)
         angle = np.linalg.norm(np.cross(normals[faces], normals[other]), axis=2)
