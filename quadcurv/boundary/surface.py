@@ -85,7 +85,7 @@ def fitted(stencils: Stencils, vertices: Indices) -> Surfaces:
 
     indptr, corners = topology.corners_by_vertex(stencils.faces, len(stencils.points))
     around, ring = nearby.rings_around(stencils.faces, indptr, corners, vertices, RINGS, ROOM)
-    size = int((around >= 0).sum(axis=1).max(initial=1))
+    size = _padded((around >= 0).sum(axis=1).max(initial=1))
     around, ring = around[:, :size], ring[:, :size]
     frames = _frames(_normals(stencils, vertices, around, ring))
     k = vertices.size
@@ -106,6 +106,11 @@ def fitted(stencils: Stencils, vertices: Indices) -> Surfaces:
     best = np.arange(k), np.argmin(error, axis=1)
     chosen = [values[best] for values in (maps, coefficients, error, noise, bend)]
     return Surfaces._make((stencils.points[vertices], frames, *chosen, around, ring))
+
+
+def _padded(size: int) -> int:
+    """A width for so many neighbours, at which zeros behind them do not change how sums are rounded."""
+    return int(-(-size // 16) * 16)
 
 
 def _distance(stencils: Stencils, around: Ints, ring: Ints) -> Floats:
@@ -156,7 +161,7 @@ def _fits(
         own, spread_out = _maps(x[at], inside[at])
         at, own = at[spread_out], own[spread_out]
         if at.size:
-            m = int(inside[at].sum(axis=1).max()) + 1  # the rings come one after the other
+            m = _padded(inside[at].sum(axis=1).max() + 1)  # the rings come one after the other
             u = x[at, :m, :2] @ np.swapaxes(own, 1, 2)
             c, noise[at, d], gain[at, d], bend[at, d] = _fit(
                 u, x[at, :m, 2], inside[at, :m], ring[at, :m] == 1, degree, own @ np.swapaxes(own, 1, 2)
