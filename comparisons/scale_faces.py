@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import pickle
+import shutil
 import signal
 import sys
 import threading
@@ -18,8 +19,8 @@ import numpy as np
 import quadcurv as qc
 from comparisons.scale import Setting, begin, cost, table
 
-# Vertices a side of a torus, natural and shuffled; the large one is measured where QUADCURV_LARGE is set.
-SIDE, SHUFFLED, LARGE = 4096, 2048, 8192
+# Vertices a side of a torus, natural and shuffled; the large ones are measured where QUADCURV_LARGE is set.
+SIDE, SHUFFLED, LARGE, HUGE = 4096, 2048, 8192, 16384
 _ROWS = 256
 _HERE = (("into parts", "cut", ()), ("part by part", "by_parts", (0,)))
 _WORKERS = (("1 worker", "by_parts", (1,)), ("2 workers", "by_parts", (2,)))
@@ -31,12 +32,15 @@ def section(setting: Setting) -> list[str]:
     side, other = (128, 96) if setting.quick else (SIDE, SHUFFLED)
     large = bool(os.environ.get("QUADCURV_LARGE")) and not setting.quick
     rows = measured(setting, side, "natural", (*_WHOLE, *_HERE, *_WORKERS))
-    rows += measured(setting, other, "shuffled", (*_WHOLE, *_HERE))
-    if large:
-        rows += measured(setting, LARGE, "natural", (*_HERE, *_WORKERS))
     killed = cost("comparisons.scale_faces:killed", str(setting.folder / f"natural{side}"))
     if not killed.told["same"]:
         raise AssertionError("with a worker killed the result is not bitwise one mesh")
+    _remove(setting, "natural", side)
+    rows += measured(setting, other, "shuffled", (*_WHOLE, *_HERE))
+    _remove(setting, "shuffled", other)
+    for n, ways in ((LARGE, (*_HERE, *_WORKERS)), (HUGE, _HERE)) if large else ():
+        rows += measured(setting, n, "natural", ways)
+        _remove(setting, "natural", n)
     lines = [
         "A bumpy torus of quads from .npy files, the mean curvature by finite volumes into one. *Into parts*",
         "writes the faces of each part of about a million vertices to a file, once; the rest is without it.",
@@ -49,8 +53,13 @@ def section(setting: Setting) -> list[str]:
         "One of two workers killed after a third of the vertices: the result was bitwise the same.",
     ]
     if not large:
-        lines += ["", f"{LARGE**2 / 1e6:.3g}M vertices: not measured; QUADCURV_LARGE=1 measures them."]
+        sizes = f"{LARGE**2 / 1e6:.3g}M and {HUGE**2 / 1e6:.3g}M"
+        lines += ["", f"{sizes} vertices: not measured; QUADCURV_LARGE=1 measures them."]
     return lines
+
+
+def _remove(setting: Setting, order: str, n: int) -> None:
+    shutil.rmtree(setting.folder / f"{order}{n}")
 
 
 Way = tuple[str, str, tuple[int, ...]]

@@ -111,8 +111,10 @@ class Connectivity:
         return replace(self, order=Order(vertices, place, ring))
 
 
-def connect(faces: Any, points: Floats) -> Connectivity:
+def connect(faces: Any, points: Floats, turn: Bools | None = None) -> Connectivity:
     """Check and mend faces, turn them to agree with their neighbours, find the rings.
+
+    Which of the given faces to turn may be known, as of a part of a larger mesh: then no others are.
 
     Raises
     ------
@@ -138,18 +140,20 @@ def connect(faces: Any, points: Floats) -> Connectivity:
                 polygons = polygons._replace(face=polygons.face[kept])
             ring, others, kind, bad_edge, n_disagree = topology.fans(table, n)
     orientable = True
-    if n_disagree:
+    if turn is not None:
+        turn = turn if source is None else turn[source]
+    elif n_disagree:
         turn, orientable = _consistent_sides(table)
-        if turn.any():
-            faces_turned = np.unique(np.flatnonzero(turn) if source is None else source[turn])
-            findings.append(Finding("turned", faces_turned.size, f"face {faces_turned[0]}"))
-            table = table.copy()
-            quad = table[:, 3] >= 0
-            table[turn & quad] = table[turn & quad][:, [0, 3, 2, 1]]
-            table[turn & ~quad] = table[turn & ~quad][:, [0, 2, 1, 3]]
-            if polygons is not None:
-                polygons = polygons.turned(turn)
-            ring, others, kind, bad_edge, _ = topology.fans(table, n)
+    if turn is not None and turn.any():
+        faces_turned = np.unique(np.flatnonzero(turn) if source is None else source[turn])
+        findings.append(Finding("turned", faces_turned.size, f"face {faces_turned[0]}"))
+        table = table.copy()
+        quad = table[:, 3] >= 0
+        table[turn & quad] = table[turn & quad][:, [0, 3, 2, 1]]
+        table[turn & ~quad] = table[turn & ~quad][:, [0, 2, 1, 3]]
+        if polygons is not None:
+            polygons = polygons.turned(turn)
+        ring, others, kind, bad_edge, _ = topology.fans(table, n)
     if bad_edge[2]:
         ends = np.unique(edges(table).shared_by_many)
         kind[ends] = topology.NONMANIFOLD
@@ -194,22 +198,30 @@ def _consistent_sides(faces: Ints) -> tuple[Bools, bool]:
 
     Non-orientable components are left as they are.
     """
-    m = len(faces)
     f, i, g, j = face_pairs(faces)
-    same_way = faces[f, i] == faces[g, j]
-    # Node f is face f as given, node f + m the same face turned; an edge joins what goes together.
+    label = sides(len(faces), f, g, faces[f, i] == faces[g, j])
+    m = len(faces)
+    return fewest_turned(label, np.ones(m), np.arange(m)), not bool((label[:m] == label[m:]).any())
+
+
+def sides(m: int, f: Indices, g: Indices, differ: Bools) -> Indices:
+    """What goes together of m things (2 m,), as they are, then turned, if f and g agree or differ."""
     rows = np.concatenate((f, f + m))
-    columns = np.concatenate((np.where(same_way, g + m, g), np.where(same_way, g, g + m)))
+    columns = np.concatenate((np.where(differ, g + m, g), np.where(differ, g, g + m)))
     graph = scipy.sparse.coo_array((np.ones(rows.size, bool), (rows, columns)), shape=(2 * m, 2 * m))
-    label = scipy.sparse.csgraph.connected_components(graph, directed=False)[1]
-    orientable = not bool((label[:m] == label[m:]).any())
-    kept = np.bincount(label[:m], minlength=label.max() + 1)
-    turned = np.bincount(label[m:], minlength=label.max() + 1)
-    # A component and its mirror image differ in which faces they turn: keep the one that turns fewer.
-    ours, theirs = kept[label[:m]], turned[label[:m]]
-    first = np.full(label.max() + 1, m)
-    np.minimum.at(first, label[:m], np.arange(m))
-    mirror = np.empty(label.max() + 1, np.int64)
-    mirror[label[:m]] = label[m:]
-    tie = first[label[:m]] > first[mirror[label[:m]]]
-    return (ours < theirs) | ((ours == theirs) & tie), orientable
+    label: Indices = scipy.sparse.csgraph.connected_components(graph, directed=False)[1]
+    return label
+
+
+def fewest_turned(label: Indices, faces: NDArray[Any], first: Indices) -> Bools:
+    """Which things to turn: what goes together and its mirror image differ in which are, keep that of fewer.
+
+    Each of them is so many faces; of as many the one that leaves the first face is kept.
+    """
+    ours, theirs = np.split(label, 2)
+    kept = np.bincount(ours, faces, minlength=label.max(initial=-1) + 1)
+    earliest = np.full(kept.size, np.iinfo(np.int64).max)
+    np.minimum.at(earliest, ours, first)
+    tie = (kept[ours] == kept[theirs]) & (earliest[ours] > earliest[theirs])
+    turn: Bools = (kept[ours] < kept[theirs]) | tie
+    return turn

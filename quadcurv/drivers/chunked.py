@@ -26,13 +26,13 @@ from quadcurv.drivers.windows import (
     arrays_of,
     blocks,
     edges,
-    forget,
     opened,
     ranges,
     taken,
 )
 from quadcurv.mesh import ChunkedGrid
 from quadcurv.mesh.grid import refuse_repetition
+from quadcurv.mesh.mapped import forget
 from quadcurv.precision import error_at_edges, sample, warn_of_error
 from quadcurv.types import Floats, MeshError, warn
 

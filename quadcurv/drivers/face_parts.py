@@ -11,8 +11,11 @@ import numpy as np
 
 from quadcurv import drivers
 from quadcurv.boundary import REACH, checked_boundary
+from quadcurv.checks import Finding
 from quadcurv.drivers import direct, fits
+from quadcurv.mesh import part_sides
 from quadcurv.mesh.face_parts import FaceParts
+from quadcurv.mesh.mapped import forget
 from quadcurv.schemes import Fit, Laplacian, Scheme
 from quadcurv.types import Floats, Indices, MeshError, MeshWarning
 
@@ -45,23 +48,37 @@ def evaluate(
     if isinstance(scheme, Fit) and scheme.name == "jet-auto":
         raise ValueError("scheme: jet-auto chooses for a mesh as a whole, which parts do not see")
     results = _arrays(mesh, wanted, scheme, {} if out is None else out)
+    try:
+        said = _by_parts(mesh, scheme, boundary, results)
+    except part_sides.SidesError:
+        part_sides.find(mesh)
+        said = _by_parts(mesh, scheme, boundary, results)
+    if said:
+        warnings.warn("; ".join(said), MeshWarning, stacklevel=3)
+    return results
+
+
+def _by_parts(mesh: FaceParts, scheme: Scheme, boundary: str, results: dict[str, Any]) -> list[str]:
+    """Compute part by part; what there is to warn of."""
     said: list[str] = []
     # Flaps of triangles are computed relative to the first irregular vertex.
     seen_from = mesh.first_irregular() if mesh.has_triangles and _is_fast(scheme) else None
     job = _Job(tuple(results), scheme, boundary, seen_from)
-    for vertices, found, warned in _answers(mesh, job):
-        at = _slice(vertices)
+    for at, found, warned in _answers(mesh, job):
         for name, values in found.items():
             results[name][at] = values
+            if isinstance(at, slice):
+                forget(results[name], at.start, at.stop)
         if warned:
             said.append(warned)
     if said:
-        warnings.warn(
-            f"{len(said)} part(s) of the mesh have what is mended, one of them: {said[0]}",
-            MeshWarning,
-            stacklevel=3,
-        )
-    return results
+        said = [f"{len(said)} part(s) of the mesh have what is mended, one of them: {said[0]}"]
+    sides = mesh.sides
+    if sides is not None:
+        findings = [Finding("turned", sides.turned, f"face {sides.first}")] if sides.turned else []
+        findings += [] if sides.orientable else [Finding("non_orientable", 1, "")]
+        said = [str(finding) for finding in findings] + said
+    return said
 
 
 class _Job(NamedTuple):
@@ -77,7 +94,7 @@ def _is_fast(scheme: Scheme) -> bool:
     return isinstance(scheme, Laplacian) and scheme.fast is not None
 
 
-Answer = tuple[Indices, dict[str, Floats], str]
+Answer = tuple["Indices | slice", dict[str, Floats], str]
 
 
 def _answers(mesh: FaceParts, job: _Job) -> Iterator[Answer]:
@@ -120,9 +137,9 @@ def part_results(mesh: FaceParts, p: int, job: _Job, alone: bool = False) -> Ans
     except MeshError as error:
         raise MeshError(f"part {p}, vertices {mesh.cuts[p]}..{mesh.cuts[p + 1] - 1}: {error}") from None
     owned = mesh.owned(p)
+    size = int(mesh.cuts[p + 1] - mesh.cuts[p])
     results = {
-        name: np.full((owned.size, *(_OF_FITS if is_fit else direct.PER_VERTEX)[name]), np.nan)
-        for name in wanted
+        name: np.full((size, *(_OF_FITS if is_fit else direct.PER_VERTEX)[name]), np.nan) for name in wanted
     }
     if part is None:
         if "dual_areas" in results:
@@ -136,7 +153,7 @@ def part_results(mesh: FaceParts, p: int, job: _Job, alone: bool = False) -> Ans
         around = fits.MeshNeighbourhoods(part.mesh, boundary)
         around.rounding = fits.ROUNDING * mesh.largest
         found = _named(fits.fit_around(around, scheme), wanted)
-    place = np.searchsorted(owned, part.vertices) if not mesh.renumbered else _places(owned, part.vertices)
+    place = part.vertices - owned.start if isinstance(owned, slice) else _places(owned, part.vertices)
     for name, values in found.items():
         results[name][place] = values[part.own]
     return owned, results, part.said
@@ -156,13 +173,6 @@ def _places(owned: Indices, vertices: Indices) -> Indices:
     return order[np.searchsorted(owned[order], vertices)]
 
 
-def _slice(vertices: Indices) -> Any:
-    """Vertices that follow each other as a slice, which arrays on disk take too."""
-    if vertices.size and vertices[-1] - vertices[0] + 1 == vertices.size and (np.diff(vertices) == 1).all():
-        return slice(int(vertices[0]), int(vertices[-1]) + 1)
-    return vertices
-
-
 def _arrays(mesh: FaceParts, wanted: Iterable[str], scheme: Scheme, out: Mapping[str, Any]) -> dict[str, Any]:
     """The caller's arrays, anything that takes slices, or new ones in memory."""
     known = _OF_FITS if isinstance(scheme, Fit) else direct.PER_VERTEX
@@ -172,7 +182,9 @@ def _arrays(mesh: FaceParts, wanted: Iterable[str], scheme: Scheme, out: Mapping
             raise ValueError(f"wanted: expected some of {', '.join(known)}, got {name!r}")
         full = mesh.shape + known[name]
         array = out[name] if name in out else np.empty(full)
-        if tuple(array.shape) != full or array.dtype != np.float64:
-            raise ValueError(f"out: {name} wants float64 of shape {full}, got {array.dtype} of {array.shape}")
+        shape, dtype = getattr(array, "shape", ()), np.dtype(getattr(array, "dtype", object))
+        if not hasattr(array, "__setitem__") or tuple(shape) != full or dtype.kind != "f":
+            got = f"{type(array).__name__} of {dtype}, shape {tuple(shape)}"
+            raise ValueError(f"out: {name} wants floats of shape {full} that can be written to, got {got}")
         results[name] = array
     return results

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import mmap
 from collections.abc import Callable, Iterator, Sequence
 from itertools import product
 from typing import Any, NamedTuple
@@ -12,6 +11,7 @@ import numpy as np
 from quadcurv.checks import checked_points
 from quadcurv.mesh import ChunkedGrid, QuadGrid, StaggeredGrid
 from quadcurv.mesh.chunked import part
+from quadcurv.mesh.mapped import forget
 from quadcurv.types import Bools, Floats, MeshError
 
 Range = tuple[int, int]
@@ -235,26 +235,6 @@ def _with_holes(
     x = np.array(_checked(x, "points", at, extent))
     x[mask] = np.nan
     return x, mask
-
-
-def forget(array: Any, begin: int, end: int) -> None:
-    """Let go of the memory of rows of a file that is mapped into memory; they stay in the file."""
-    if not isinstance(array, np.memmap) or array.mode == "c" or not array.flags.c_contiguous:
-        return
-    mapped = array
-    while isinstance(mapped.base, np.ndarray):
-        mapped = mapped.base  # type: ignore[assignment]
-    if not isinstance(mapped.base, mmap.mmap) or not hasattr(mmap, "MADV_DONTNEED") or end <= begin:
-        return
-    whole = np.frombuffer(mapped.base, np.uint8).__array_interface__["data"][0]
-    start = array.__array_interface__["data"][0] - whole
-    page = mmap.PAGESIZE
-    low, high = (
-        (start + begin * array.strides[0]) // page * page,
-        (start + end * array.strides[0]) // page * page,
-    )
-    if high > low:
-        mapped.base.madvise(mmap.MADV_DONTNEED, low, high - low)
 
 
 def edges(window: Window, i: Any, j: Any, shape: tuple[int, int]) -> Iterator[Floats]:

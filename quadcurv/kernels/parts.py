@@ -22,12 +22,15 @@ def owner(cuts, v):
 
 @kernel
 def _owners(faces, cuts, number, part, count):
-    renumbered = number.size > 0
+    renumbered, last = number.size > 0, 0
     for f in range(faces.size // 4):
         for s in range(4):
             v, p = faces[4 * f + s], -1
             if v >= 0:
-                p = owner(cuts, number[v] if renumbered else v)
+                v = number[v] if renumbered else v
+                if v < cuts[last] or v >= cuts[last + 1]:  # mostly it is the part of the corner before
+                    last = owner(cuts, v)
+                p = last
             for t in range(s):
                 if part[4 * f + t] == p:
                     p = -1
@@ -77,6 +80,67 @@ def by_part(faces, first, cuts, number):
     out = np.empty((begin[-1], 5), np.int32)
     _by_part(faces, first, number, part, begin[:-1].copy(), out.reshape(-1))
     return out, begin
+
+
+@kernel
+def _corners(faces, begin, end, used, beyond):
+    count = 0
+    for f in range(faces.size // 5):
+        for k in range(5 * f + 1, 5 * f + 5):
+            v = faces[k]
+            if v >= begin and v < end:
+                used[v - begin] = True
+            elif v >= 0:
+                beyond[count] = v
+                count += 1
+    return count
+
+
+def corners(faces, begin, end):
+    """Which of the vertices begin..end faces (k, 5) as `by_part` has them have, and all their others (c,)."""
+    used, beyond = np.zeros(end - begin, np.bool_), np.empty(4 * len(faces), np.int32)
+    count = _corners(flat(faces, np.int32), begin, end, used, beyond)
+    return used, beyond[:count].copy()
+
+
+@kernel
+def _placed(faces, begin, own, beyond, place, out):
+    for f in range(faces.size // 5):
+        for s in range(4):
+            v = faces[5 * f + 1 + s]
+            k = v - begin
+            if v < 0:
+                out[4 * f + s] = -1
+            elif k >= 0 and k < own.size:
+                out[4 * f + s] = own[k]
+            else:
+                low, high = 0, beyond.size
+                while high - low > 1:
+                    middle = (low + high) // 2
+                    if beyond[middle] <= v:
+                        low = middle
+                    else:
+                        high = middle
+                out[4 * f + s] = place[low]
+
+
+def placed(faces, begin, own, beyond, place):
+    """Faces (k, 4) int32 over other numbers of their vertices.
+
+    Parameters
+    ----------
+    faces : (k, 5) int32
+        As `by_part` has them.
+    begin : int
+    own : (c,) int32
+        New numbers of the vertices from `begin` on.
+    beyond, place : (b,) int32
+        All other vertices, in ascending order, and their new numbers.
+    """
+    out = np.empty((len(faces), 4), np.int32)
+    given = (flat(array, np.int32) for array in (own, beyond, place))
+    _placed(flat(faces, np.int32), begin, *given, out.reshape(-1))
+    return out
 
 
 @kernel

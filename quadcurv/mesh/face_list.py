@@ -102,6 +102,13 @@ class QuadMesh:
         )
         warn_of(self.connectivity.findings)
 
+    @classmethod
+    def of(cls, points: Floats, connectivity: Connectivity, roundoff: float) -> QuadMesh:
+        """Checked points under a connectivity that is known."""
+        mesh = object.__new__(cls)
+        mesh.__dict__.update(points=points, connectivity=connectivity, recovery=None, roundoff=roundoff)
+        return mesh
+
     def __repr__(self) -> str:
         triangles = int(np.count_nonzero(self.faces[:, 3] < 0))
         kinds = f"{len(self.faces) - triangles} quads" + (f", {triangles} triangles" if triangles else "")

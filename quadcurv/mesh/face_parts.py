@@ -3,21 +3,21 @@
 from __future__ import annotations
 
 import os
-import warnings
-from collections.abc import Iterator
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from quadcurv.checks import Finding, Report, unit_roundoff
+from quadcurv.checks import Report, checked_points, unit_roundoff
+from quadcurv.connectivity import Connectivity, connect
+from quadcurv.mesh import part_files, part_sides
 from quadcurv.mesh.face_list import QuadMesh
-from quadcurv.types import Bools, Indices, Ints, MeshError, MeshWarning
+from quadcurv.types import Bools, Indices, Ints, MeshError
 
-CHUNK = 1 << 20  # vertices or faces that are read at a time
-_SAMPLE = 200_000  # of the points, by which space is divided
-_SCATTERED = 1.3  # parts that a face has vertices of, on average, from which on the order of vertices is bad
+_VERTICES = 1 << 19  # of a part, where nobody says
+_NONE = np.empty(0, np.int64)
 
 
 class Part(NamedTuple):
@@ -57,7 +57,7 @@ class FaceParts:
     faces : (m, 4) or (m, 3) array-like of int
         As of :class:`QuadMesh`, with slices.
     folder : path-like
-        Where the parts are kept, 20 bytes a face, and of vertices in no good order 28 bytes each; workers
+        Where the parts are kept, 20 bytes a face, and of vertices in no good order 32 bytes each; workers
         must see it. It must be empty, or not there.
     parts : int, optional
         How many; by default so many that each has half a million vertices.
@@ -77,8 +77,13 @@ class FaceParts:
     Raises
     ------
     MeshError
-        A ValueError: wrong shapes or types, indices out of range, points that are not finite; when computed,
-        faces that run against their neighbours: which way they are to turn no part knows alone.
+        A ValueError: wrong shapes or types, indices out of range, points that are not finite.
+
+    Warns
+    -----
+    MeshWarning
+        When computed, with what was mended. Faces that run against their neighbours are found then: which are
+        to turn is told by all parts, of which those that hang together are joined, and computing begins anew.
 
     See Also
     --------
@@ -114,12 +119,12 @@ class FaceParts:
         parts: int | None = None,
         client: Any = None,
     ) -> None:
-        n = _checked_shape(points, "points", "fiu", (3,))
-        m = _checked_shape(faces, "faces", "iu", (3, 4))
+        n = part_files.checked_shape(points, "points", "fiu", (3,))
+        m = part_files.checked_shape(faces, "faces", "iu", (3, 4))
         if n > np.iinfo(np.int32).max // 4 or m > np.iinfo(np.int32).max:
             raise MeshError(f"points: {n} and {m} faces are more than 32-bit indices can number")
         if parts is None:
-            parts = max(1, n // (CHUNK // 2))
+            parts = max(1, n // _VERTICES)
         if isinstance(parts, bool) or not isinstance(parts, int | np.integer) or not 1 <= parts <= n:
             raise MeshError(f"parts: expected a whole number from 1 to {n}, got {parts!r}")
         place = Path(folder)
@@ -127,18 +132,20 @@ class FaceParts:
         if any(place.iterdir()):
             raise MeshError(f"folder: {place} is not empty")
         cuts = np.arange(parts + 1) * n // parts
-        number, largest = np.empty(0, np.int32), _largest(points)
-        renumbered = parts > 1 and _scattered(faces, cuts)
+        number, largest = np.empty(0, np.int32), part_files.largest(points)
+        renumbered = parts > 1 and part_files.scattered(faces, cuts)
         if renumbered:
-            cuts, number = _renumber(points, parts, place)
-            source = _mapped(np.load(place / "points.npy", mmap_mode="r"))
+            cuts, number = part_files.renumber(points, parts, place)
+            source = part_files.mapped(np.load(place / "points.npy", mmap_mode="r"))
+        elif part_files.is_a_file(points):
+            source = part_files.mapped(points)
         else:
-            source = _mapped(points) if _is_a_file(points) else _copied(points, place)
+            source = part_files.copied(points, place)
         self.__dict__.update(
             folder=place, shape=(n,), cuts=cuts, renumbered=renumbered, client=client,
             roundoff=unit_roundoff(points), largest=largest, _source=source,
         )  # fmt: skip
-        self.__dict__["has_triangles"] = _write_parts(faces, n, cuts, number, place)
+        self.__dict__["has_triangles"] = part_files.write_parts(faces, n, cuts, number, place)
 
     def __repr__(self) -> str:
         return f"FaceParts({self.shape[0]} points in {self.parts} parts)"
@@ -151,6 +158,11 @@ class FaceParts:
         """How many parts there are."""
         return len(self.cuts) - 1
 
+    @property
+    def sides(self) -> part_sides.Sides | None:
+        """Which faces are turned, None while nobody has asked: none need be where no part finds any."""
+        return part_sides.known(self.folder)
+
     def part(self, p: int, rings: int, everywhere: bool, origin: int | None = None) -> Part | None:
         """Part p with so many rings of faces around its irregular vertices, or around all of them.
 
@@ -159,16 +171,16 @@ class FaceParts:
 
         Raises
         ------
-        MeshError
-            Faces run against their neighbours.
+        SidesError
+            Faces run against their neighbours, and `sides` is None.
         """
-        faces = self._faces(p)
+        faces = self.faces_of(p)
         if len(faces) == 0:
             return None
         begin, end = int(self.cuts[p]), int(self.cuts[p + 1])
         first = [0] if origin is None else [0, origin]
         origins = np.array([self._number(v) for v in first], np.int64)
-        made, vertices = self._mesh(faces, begin, end, origins)
+        made, vertices = self.mesh_of(faces, begin, end, origins)
         inner = self._inner(vertices, begin, end, len(origins))
         irregular = made.connectivity.irregular
         wanted = np.flatnonzero(inner) if everywhere else irregular[inner[irregular]]
@@ -176,37 +188,38 @@ class FaceParts:
         if wanted.size:
             more, reached = self._around(faces, np.sort(vertices[wanted]), rings, begin, end)
             if len(more) > len(faces):
-                made, vertices = self._mesh(more, begin, end, origins)
+                made, vertices = self.mesh_of(more, begin, end, origins)
                 inner = self._inner(vertices, begin, end, len(origins))
             complete = inner | np.isin(vertices, reached)
             complete[: len(origins)] = False
         known = made.connectivity
-        _refuse_turned(known.findings)
         own = np.flatnonzero(inner)
         irregular = known.irregular[complete[known.irregular]]
         if origin is not None:
             irregular = np.concatenate(([1], irregular))
         # Vertices at the rim have more faces than are here: they are no border.
         kind = np.where(complete, known.kind, _interior()).astype(np.uint8)
-        said = Report([finding._replace(first="") for finding in known.findings]).warning
+        mended = (finding._replace(first="") for finding in known.findings if finding.kind != "turned")
         made = made.with_connectivity(replace(known, irregular=irregular, kind=kind))
-        return Part(made, own, self._given_numbers(vertices[own]), said)
+        return Part(made, own, self._given_numbers(vertices[own]), Report(mended).warning)
 
-    def owned(self, p: int) -> Indices:
+    def owned(self, p: int) -> Indices | slice:
         """Numbers of the vertices of part p in the whole mesh."""
+        if not self.renumbered:
+            return slice(int(self.cuts[p]), int(self.cuts[p + 1]))
         return self._given_numbers(np.arange(self.cuts[p], self.cuts[p + 1]))
 
     def first_irregular(self) -> int | None:
         """The first vertex without a regular ring, None if there is none; the first parts tell, or all."""
         found = []
         for p in range(self.parts):
-            faces = self._faces(p)
+            faces, begin, end = self.faces_of(p), int(self.cuts[p]), int(self.cuts[p + 1])
             if len(faces) == 0:
-                continue
-            begin, end = int(self.cuts[p]), int(self.cuts[p + 1])
-            made, vertices = self._mesh(faces, begin, end, np.empty(0, np.int64))
-            irregular = vertices[made.connectivity.irregular]
-            irregular = irregular[(irregular >= begin) & (irregular < end)]
+                irregular = np.arange(begin, end)  # isolated
+            else:
+                made, vertices = self.mesh_of(faces, begin, end)
+                regular = np.delete(vertices, made.connectivity.irregular)
+                irregular = np.setdiff1d(np.arange(begin, end), regular)
             if irregular.size:
                 found.append(int(self._given_numbers(irregular).min()))
                 if not self.renumbered:
@@ -224,54 +237,65 @@ class FaceParts:
         """Number of a vertex here."""
         if not self.renumbered:
             return vertex
-        order = np.load(self.folder / "order.npy", mmap_mode="r")
-        return next(
-            begin + int(np.flatnonzero(x == vertex)[0]) for begin, x in _chunks(order) if (x == vertex).any()
-        )
+        return int(np.load(self.folder / "number.npy", mmap_mode="r")[vertex])
 
-    def _faces(self, p: int) -> Ints:
-        """(k, 5): number and vertices of all faces with a vertex of part p."""
-        return np.fromfile(self.folder / f"faces{p}.bin", np.int32).reshape(-1, 5)
+    def faces_of(self, p: int) -> Ints:
+        """(k, 5): number and vertices of all faces with a vertex of part p; ~number where one is turned."""
+        return part_files.read_faces(self.folder, p)
 
     def _points(self, vertices: Indices) -> Any:
         path, offset, dtype, shape = self._source
-        return np.asarray(np.memmap(path, dtype, "r", offset, shape)[vertices])
+        return np.take(np.asarray(np.memmap(path, dtype, "r", offset, shape)), vertices, axis=0)
 
     def _given_numbers(self, vertices: Indices) -> Indices:
         if not self.renumbered:
             return vertices.astype(np.int64)
         return np.load(self.folder / "order.npy", mmap_mode="r")[vertices].astype(np.int64)
 
-    def _mesh(self, faces: Ints, begin: int, end: int, origins: Indices) -> tuple[QuadMesh, Indices]:
+    def mesh_of(
+        self,
+        faces: Ints,
+        begin: int,
+        end: int,
+        origins: Indices = _NONE,
+        connected: Callable[[Ints, Any, Bools], Connectivity] | None = None,
+    ) -> tuple[QuadMesh, Indices]:
         """A mesh of faces (k, 5), most of them of vertices begin..end, and the numbers of its vertices.
 
-        They are in the order that the whole mesh has.
+        They are in the order that the whole mesh has. Vertices that schemes have as origins in the whole mesh
+        come first, without faces.
         """
-        corners = faces[:, 1:]
-        own = (corners >= begin) & (corners < end)
-        used = np.zeros(end - begin, bool)
-        used[corners[own] - begin] = True
-        beyond = np.unique(corners[~own])
-        beyond = beyond[beyond >= 0].astype(np.int64)
+        from quadcurv.kernels import parts as kernels
+
+        used, others = kernels.corners(faces, begin, end)
+        beyond = np.unique(others)
+        before = np.searchsorted(beyond, begin)
         vertices: Indices = np.concatenate(
-            (beyond[beyond < begin], begin + np.flatnonzero(used), beyond[beyond >= end])
+            (beyond[:before], np.arange(begin, end)[used], beyond[before:]), dtype=np.int64
         )
-        place = np.arange(len(vertices), dtype=np.int32)
+        place = np.arange(len(origins), len(origins) + len(vertices), dtype=np.int32)
         if self.renumbered:
             order = np.argsort(self._given_numbers(vertices))
-            place[order] = np.arange(len(vertices))
-        local = np.full(corners.shape, -1, np.int32)
-        within = np.cumsum(used) - 1 + np.count_nonzero(beyond < begin)
-        local[own] = place[within[corners[own] - begin]]
-        other = ~own & (corners >= 0)
-        local[other] = place[np.searchsorted(vertices, corners[other])]
-        vertices = vertices[order] if self.renumbered else vertices
-        # Vertices that schemes have as origins in the whole mesh come first, without faces.
+            place[order] = place.copy()
+            vertices = vertices[order]
+        own = np.full(end - begin, -1, np.int32)
+        last = len(place) - (len(beyond) - before)
+        own[used] = place[before:last]
+        table = kernels.placed(faces, begin, own, beyond, np.concatenate((place[:before], place[last:])))
         vertices = np.concatenate((origins, vertices))
-        local[local >= 0] += len(origins)
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", MeshWarning)
-            return QuadMesh(self._points(vertices), local), vertices
+        points = checked_points(self._points(vertices), "points", ("n", 3))
+        connectivity = (connected or self._connected)(table, points, faces[:, 0] < 0)
+        return QuadMesh.of(points, connectivity, self.roundoff), vertices
+
+    def _connected(self, table: Ints, points: Any, turned: Bools) -> Connectivity:
+        """Faces of a part, turned as all of them are."""
+        sides = self.sides
+        if sides is not None:
+            return replace(connect(table, points, turned), orientable=sides.orientable)
+        known = connect(table, points)
+        if any(finding.kind in ("turned", "non_orientable") for finding in known.findings):
+            raise part_sides.SidesError
+        return known
 
     def _around(
         self, faces: Ints, vertices: Indices, rings: int, begin: int, end: int
@@ -287,7 +311,7 @@ class FaceParts:
             for q in np.unique(owner).tolist():
                 first, last = int(self.cuts[q]), int(self.cuts[q + 1])
                 if first not in known:
-                    known[first] = _Owned(self._faces(q), first, last)
+                    known[first] = _Owned(self.faces_of(q), first, last)
                 near.append(known[first].touching(fresh[owner == q], rings - ring))
                 if first != begin:
                     fetched.append(near[-1])
@@ -296,7 +320,7 @@ class FaceParts:
             fresh = np.setdiff1d(corners[corners >= 0], reached)
         everything = np.concatenate(fetched)
         if len(everything) > len(faces):
-            _, first_of = np.unique(everything[:, 0], return_index=True)
+            _, first_of = np.unique(part_files.numbers(everything), return_index=True)
             everything = everything[first_of]
         return everything, reached
 
@@ -333,161 +357,7 @@ class _Owned:
         return np.ascontiguousarray(np.where((local >= 0) & (local < self._n), local, beyond))
 
 
-def _refuse_turned(findings: tuple[Finding, ...]) -> None:
-    if any(finding.kind in ("turned", "non_orientable") for finding in findings):
-        raise MeshError(
-            "faces: some run against their neighbours, and which way they are to turn no part knows alone: "
-            "give faces that agree, as quadcurv.orient makes them"
-        )
-
-
 def _interior() -> int:
     from quadcurv.kernels import topology
 
     return topology.INTERIOR
-
-
-def _checked_shape(array: Any, name: str, kinds: str, columns: tuple[int, ...]) -> int:
-    shape, dtype = getattr(array, "shape", None), getattr(array, "dtype", None)
-    if shape is None or dtype is None:
-        raise MeshError(f"{name}: expected an array with slices, got {type(array).__name__}")
-    if len(shape) != 2 or shape[1] not in columns or shape[0] < 1:
-        raise MeshError(f"{name}: shape {tuple(shape)}, expected ({'nm'[name == 'faces']}, {columns[-1]})")
-    if dtype.kind not in kinds:
-        raise MeshError(f"{name}: expected numbers of kind {kinds!r}, got dtype {dtype}")
-    return int(shape[0])
-
-
-def _chunks(array: Any) -> Iterator[tuple[int, Any]]:
-    """Where each chunk of rows begins, and the chunk in memory."""
-    for begin in range(0, array.shape[0], CHUNK):
-        yield begin, np.asarray(array[begin : begin + CHUNK])
-
-
-def _largest(points: Any) -> float:
-    """Largest size of any coordinate.
-
-    Raises
-    ------
-    MeshError
-        Points that are not finite.
-    """
-    largest = 0.0
-    for begin, x in _chunks(points):
-        bad = ~np.isfinite(x).all(axis=1)
-        if bad.any():
-            raise MeshError(
-                f"points: {np.count_nonzero(bad)} non-finite point(s) among those from {begin} on, first "
-                f"vertex {begin + int(np.argmax(bad))}"
-            )
-        largest = max(largest, float(np.abs(x).max()))
-    return largest
-
-
-def _is_a_file(points: Any) -> bool:
-    """Whether points are all that a file holds from some place on, so that others can map it as well."""
-    return (
-        isinstance(points, np.memmap)
-        and points.filename is not None
-        and points.flags.c_contiguous
-        and points.offset + points.nbytes == os.path.getsize(points.filename)
-    )
-
-
-def _mapped(points: np.memmap) -> tuple[str, int, str, tuple[int, ...]]:
-    """Where a worker finds points."""
-    return os.path.abspath(str(points.filename)), points.offset, points.dtype.str, points.shape
-
-
-def _new_points(points: Any, place: Path) -> np.memmap:
-    dtype = points.dtype if points.dtype.kind == "f" else np.dtype(float)
-    return np.lib.format.open_memmap(place / "points.npy", "w+", dtype, (int(points.shape[0]), 3))
-
-
-def _copied(points: Any, place: Path) -> tuple[str, int, str, tuple[int, ...]]:
-    copy = _new_points(points, place)
-    for begin, x in _chunks(points):
-        copy[begin : begin + len(x)] = x
-    copy.flush()
-    return _mapped(np.load(place / "points.npy", mmap_mode="r"))
-
-
-def _as_table(x: Any, n: int, begin: int) -> Ints:
-    """A chunk of faces as (k, 4) int32, checked."""
-    low, high = (-1 if x.shape[1] == 4 else 0), n - 1
-    wrong = (x > high) | (x < low)
-    if x.shape[1] == 4:
-        wrong[:, :3] |= x[:, :3] < 0
-    bad = wrong.any(axis=1)
-    if bad.any():
-        first = int(np.argmax(bad))
-        raise MeshError(
-            f"faces: {np.count_nonzero(bad)} face(s) with an index outside 0..{n - 1}, first face "
-            f"{begin + first}: {x[first].tolist()}"
-        )
-    table = np.full((len(x), 4), -1, np.int32)
-    table[:, : x.shape[1]] = x
-    return table
-
-
-def _scattered(faces: Any, cuts: Indices) -> bool:
-    """Whether ranges of vertices would have many faces in common."""
-    step = max(1, faces.shape[0] // 64)
-    parts: list[int] = []
-    for begin in range(0, faces.shape[0], step):
-        x = np.asarray(faces[begin : begin + 256])
-        owner = np.sort(np.searchsorted(cuts, np.maximum(x, 0), side="right"), axis=1)
-        parts += (1 + (np.diff(owner, axis=1) != 0).sum(axis=1)).tolist()
-    return float(np.mean(parts)) > _SCATTERED
-
-
-def _renumber(points: Any, parts: int, place: Path) -> tuple[Indices, Ints]:
-    """Write points in the order of parts that are pieces of space; where parts begin, new numbers of all."""
-    from quadcurv.kernels.parts import curve
-
-    n = int(points.shape[0])
-    low, high = np.full(3, np.inf), np.full(3, -np.inf)
-    for _, x in _chunks(points):
-        low, high = np.minimum(low, x.min(axis=0)), np.maximum(high, x.max(axis=0))
-    size = float((high - low).max())
-    step = max(1, n // _SAMPLE)
-    sample = np.concatenate([x[-begin % step :: step] for begin, x in _chunks(points)])
-    keys = np.sort(curve(sample, low, size))
-    split = keys[np.arange(1, parts) * len(keys) // parts]
-    owner = np.empty(n, np.int32)
-    for begin, x in _chunks(points):
-        owner[begin : begin + len(x)] = np.searchsorted(split, curve(x, low, size), side="right")
-    cuts = np.concatenate(([0], np.cumsum(np.bincount(owner, minlength=parts))))
-    number, begin_of = np.empty(n, np.int32), cuts[:-1].copy()
-    moved = _new_points(points, place)
-    order = np.lib.format.open_memmap(place / "order.npy", "w+", np.int32, (n,))
-    for begin, x in _chunks(points):
-        own = owner[begin : begin + len(x)]
-        at = np.argsort(own, kind="stable")
-        count = np.bincount(own, minlength=parts)
-        to = np.repeat(begin_of - np.concatenate(([0], np.cumsum(count)[:-1])), count) + np.arange(len(x))
-        number[begin + at] = to
-        moved[to], order[to] = x[at], begin + at
-        begin_of += count
-    moved.flush()
-    order.flush()
-    return cuts, number
-
-
-def _write_parts(faces: Any, n: int, cuts: Indices, number: Ints, place: Path) -> bool:
-    """Write to a file a part all faces with a vertex of it, in their order; whether any is a triangle."""
-    from quadcurv.kernels.parts import by_part
-
-    has_triangles = False
-    files = [open(place / f"faces{p}.bin", "wb") for p in range(len(cuts) - 1)]  # noqa: SIM115
-    try:
-        for begin, x in _chunks(faces):
-            table = _as_table(x, n, begin)
-            has_triangles |= bool((table[:, 3] < 0).any())
-            out, first = by_part(table, begin, cuts, number)
-            for p in np.flatnonzero(np.diff(first)).tolist():
-                files[p].write(memoryview(out[first[p] : first[p + 1]]).cast("B"))
-    finally:
-        for file in files:
-            file.close()
-    return has_triangles
