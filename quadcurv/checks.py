@@ -178,6 +178,14 @@ def _refuse_elsewhere(points: Any, name: str) -> None:
         )
 
 
+def refuse_on_device(points: Any, name: str) -> None:
+    """Refuse what lies on a device, where only face lists and grids of vertices are computed."""
+    if is_on_device(points):
+        raise MeshError(
+            f"{name}: on a device, where QuadGrid and QuadMesh alone are computed; give positions in memory"
+        )
+
+
 def unit_roundoff(points: ArrayLike) -> float:
     """Relative rounding error of positions as they are given; integers have that of doubles."""
     dtype = getattr(points, "dtype", np.dtype(float))

@@ -206,6 +206,17 @@ def test_what_is_refused(cupy):
         qc.evaluate(there, out={"mean_curvature_normal": there.points})
     with pytest.raises(qc.MeshError, match="mask: grids on a device have no holes"):
         qc.QuadGrid(cupy.asarray(x), mask=np.zeros((24, 24), bool))
+    cells, there_too = qc.surfaces.sphere().sample((8, 6), "staggered")[0], cupy.asarray(x)
+    for make, name in (
+        (lambda: qc.StaggeredGrid(cupy.asarray(cells.primal), cells.dual), "primal"),
+        (lambda: qc.StaggeredGrid(cells.primal, cupy.asarray(cells.dual)), "dual"),
+        (lambda: qc.ChunkedGrid(there_too), "points"),
+        (lambda: qc.GridBlocks([there_too]), r"blocks\[0\]: points"),
+        (lambda: qc.GridBlocks([there]), r"blocks\[0\]: points"),
+        (lambda: qc.FaceParts(there_too.reshape(-1, 3), np.zeros((1, 3), int), "nowhere"), "points"),
+    ):
+        with pytest.raises(qc.MeshError, match=f"{name}: on a device, where QuadGrid and QuadMesh alone"):
+            make()
     with pytest.raises(qc.MeshError, match=r"shape \(24, 24\), expected \(r, c, 3\)"):
         qc.QuadGrid(cupy.asarray(x[..., 0]))
     with pytest.raises(qc.MeshError, match="complex"):

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from quadcurv.checks import refuse_on_device
 from quadcurv.mesh.connections import (
     SIDES,
     Connection,
@@ -309,6 +310,8 @@ def _checked_blocks(blocks: Iterable[Any]) -> list[Any]:
     for b, block in enumerate(given):
         try:
             grids.append(block if isinstance(block, QuadGrid | StaggeredGrid) else QuadGrid(block))
+            if isinstance(grids[-1], QuadGrid):
+                refuse_on_device(grids[-1].points, "points")
         except MeshError as error:
             raise MeshError(f"blocks[{b}]: {error}") from None
     cells = [isinstance(grid, StaggeredGrid) for grid in grids]

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from quadcurv.checks import Report, checked_wrap, unit_roundoff
+from quadcurv.checks import Report, checked_wrap, refuse_on_device, unit_roundoff
 from quadcurv.mesh.grid import QuadGrid
 from quadcurv.mesh.staggered import StaggeredGrid
 from quadcurv.types import Bools, Floats, MeshError
@@ -160,6 +160,7 @@ def _check_array(array: Any, name: str, shape: tuple[Any, ...]) -> None:
     """Refuse what has no shape and dtype of its own, or another shape than that after `shape`'s dots."""
     if not (hasattr(array, "shape") and hasattr(array, "dtype") and hasattr(array, "__getitem__")):
         raise MeshError(f"{name}: expected an array with shape, dtype and slices, got {type(array).__name__}")
+    refuse_on_device(array, name)
     if isinstance(array, np.ma.MaskedArray):
         raise MeshError(f"{name}: a masked array; give its data, and its mask as mask=")
     given, wanted = tuple(array.shape), shape[1:]

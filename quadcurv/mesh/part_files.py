@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from quadcurv.checks import refuse_on_device
 from quadcurv.mesh.mapped import forget
 from quadcurv.types import Indices, Ints, MeshError
 
@@ -19,6 +20,7 @@ _SCATTERED = 1.3  # parts that a face has vertices of, on average, from which on
 
 def checked_shape(array: Any, name: str, kinds: str, columns: tuple[int, ...]) -> int:
     """How many rows an array has, of some kinds of numbers and one of so many columns."""
+    refuse_on_device(array, name)
     shape, dtype = getattr(array, "shape", None), getattr(array, "dtype", None)
     if shape is None or dtype is None:
         raise MeshError(f"{name}: expected an array with slices, got {type(array).__name__}")

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from quadcurv.checks import Report, checked_points, checked_wrap, unit_roundoff
+from quadcurv.checks import Report, checked_points, checked_wrap, refuse_on_device, unit_roundoff
 from quadcurv.mesh.face_list import summary_table
 from quadcurv.mesh.grid import refuse_repetition
 from quadcurv.stencils import Stencils
@@ -57,6 +57,8 @@ class StaggeredGrid:
     roundoff: float
 
     def __init__(self, primal: ArrayLike, dual: ArrayLike, wrap: Sequence[bool] = (False, False)) -> None:
+        refuse_on_device(primal, "primal")
+        refuse_on_device(dual, "dual")
         self.__dict__.update(
             wrap=checked_wrap(wrap),
             dual=checked_points(dual, "dual", ("r + 1", "c + 1", 3)),
