@@ -152,6 +152,76 @@ def test_files_are_read_where_they_are(mesh, dtype, tmp_path):
     check(expected, qc.evaluate(cut, *WANTED))
 
 
+@pytest.mark.parametrize("mesh", ["closed", "shuffled mixed", "triangles"])
+def test_from_vtkhdf_to_vtkhdf(mesh, tmp_path):
+    """Values go into the file that VTK has written, where VTK finds them."""
+    h5py = pytest.importorskip("h5py")
+    pytest.importorskip("vtk")
+    points, faces = MESHES[mesh]
+    whole = qc.QuadMesh(points, faces)
+    qc.write(tmp_path / "m.vtkhdf", whole)
+    expected = qc.evaluate(whole, "mean_curvature", "vertex_normals")
+    with h5py.File(tmp_path / "m.vtkhdf", "r+") as file:
+        found = qc.io.vtkhdf.VtkHdf(file)
+        assert repr(found) == f"VtkHdf({len(points)} points, {len(faces)} faces)"
+        parts = qc.FaceParts(found.points, found.faces, tmp_path / "parts", parts=4)
+        out = {"mean_curvature": found.values("H"), "vertex_normals": found.values("n", 3)}
+        check(expected, qc.evaluate(parts, out=out))
+    read = qc.read_values(tmp_path / "m.vtkhdf")
+    np.testing.assert_array_equal(read["H"], expected["mean_curvature"])
+    np.testing.assert_array_equal(read["n"], expected["vertex_normals"])
+
+
+def test_other_vtkhdf_files(tmp_path):
+    h5py = pytest.importorskip("h5py")
+    points, faces = MESHES["closed"]
+    with h5py.File(tmp_path / "m.vtkhdf", "w") as file:
+        with pytest.raises(qc.MeshError, match="no VTKHDF file"):
+            qc.io.vtkhdf.VtkHdf(file)
+        group = file.create_group("VTKHDF")
+        group.attrs["Type"] = np.bytes_(b"ImageData")
+        with pytest.raises(qc.MeshError, match="no VTKHDF file of PolyData"):
+            qc.io.vtkhdf.VtkHdf(file)
+        group.attrs["Type"] = np.bytes_(b"UnstructuredGrid")
+        group["Points"], group["NumberOfPoints"] = points, [len(points)]
+        group["Connectivity"], group["Offsets"] = faces.ravel(), 4 * np.arange(len(faces) + 1)
+        group["Types"] = np.full(len(faces), 9, np.uint8)
+        found = qc.io.vtkhdf.VtkHdf(file)
+        np.testing.assert_array_equal(found.faces[5:17], faces[5:17])
+        assert found.faces[5:5].shape == (0, 4)
+        parts = qc.FaceParts(found.points, found.faces, tmp_path / "parts", parts=3)
+        check(qc.evaluate(qc.QuadMesh(points, faces), *WANTED), qc.evaluate(parts, *WANTED))
+        group["Types"][71] = 10  # a tetrahedron
+        with pytest.raises(qc.MeshError, match="cell 71 is neither a triangle nor a quad"):
+            qc.FaceParts(found.points, found.faces, tmp_path / "other", parts=3)
+        del group["NumberOfPoints"]
+        group["NumberOfPoints"] = [3, len(points) - 3]
+        with pytest.raises(qc.MeshError, match="several pieces"):
+            qc.io.vtkhdf.VtkHdf(file)
+
+
+@pytest.mark.parametrize("mesh", ["closed", "shuffled"])
+@pytest.mark.parametrize("kind", ["zarr", "h5py"])
+def test_results_go_into_arrays_of_other_libraries(kind, mesh, tmp_path):
+    library = pytest.importorskip(kind)
+    points, faces = MESHES[mesh]
+    parts = qc.FaceParts(points, faces, tmp_path / "parts", parts=4)
+    expected = qc.evaluate(qc.QuadMesh(points, faces), "mean_curvature", "mean_curvature_normal")
+    if kind == "zarr":
+        group = library.open_group(tmp_path / "out.zarr", mode="w")
+        make = group.create_array
+    else:
+        group = library.File(tmp_path / "out.h5", "w")
+        make = group.create_dataset
+    out = {
+        "mean_curvature": make("H", shape=(len(points),), dtype="f4"),
+        "mean_curvature_normal": make("Hn", shape=points.shape, dtype="f8"),
+    }
+    qc.evaluate(parts, out=out)
+    np.testing.assert_array_equal(out["mean_curvature"][:], expected["mean_curvature"].astype(np.float32))
+    np.testing.assert_array_equal(out["mean_curvature_normal"][:], expected["mean_curvature_normal"])
+
+
 def test_isolated_vertices_and_parts_without_faces(tmp_path):
     points, faces = MESHES["closed"]
     points = np.concatenate((points, np.full((200, 3), 9.0)))

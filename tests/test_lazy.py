@@ -140,6 +140,39 @@ def test_other_processes():
         assert equal(lazy.compute(), whole)
 
 
+@pytest.mark.slow
+@pytest.mark.filterwarnings("ignore")
+def test_a_worker_killed_in_the_middle_changes_nothing(tmp_path):
+    """The tasks that it was at are done again by the other one; blocks go from zarr to zarr."""
+    import os
+    import signal
+    import threading
+
+    from distributed import Client, LocalCluster
+
+    zarr = pytest.importorskip("zarr")
+    x, wrap = points("rough", (False, True), 120, 90), (False, True)
+    z = zarr.create_array(store=tmp_path / "x.zarr", shape=x.shape, chunks=(8, 9, 3), dtype="f8")
+    z[:] = x
+    whole = qc.mean_curvature(qc.QuadGrid(x, wrap), "finite_volume")
+    cluster = LocalCluster(2, threads_per_worker=1, processes=True, dashboard_address=None)
+    with cluster, Client(cluster) as client:
+        victim, done = next(iter(client.run(os.getpid).values())), []
+        timer = threading.Timer(1.0, lambda: done.append(os.kill(victim, signal.SIGKILL)))
+        timer.start()
+        for k in range(30):
+            into = zarr.create_array(
+                store=tmp_path / f"{k}.zarr", shape=x.shape[:2], chunks=(8, 9), dtype="f8"
+            )
+            lazy = qc.mean_curvature(qc.ChunkedGrid(da.from_zarr(tmp_path / "x.zarr"), wrap), "finite_volume")
+            da.store(lazy, into, lock=False)
+            if done:
+                break
+        timer.join()
+        assert done
+        assert equal(into[:], whole)
+
+
 @pytest.mark.parametrize("lazy", [da.from_array, None], ids=["dask", "numpy"])
 def test_a_grid_in_memory_refuses_what_is_not(lazy, tmp_path):
     if lazy is None:
