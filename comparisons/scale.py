@@ -145,10 +145,10 @@ SECTIONS: dict[str, tuple[str, str]] = {
 """By name: the heading, and the `Section` that measures, as "module:function"."""
 
 
-def machine() -> str:
-    """The processor, the cores and the versions of libraries."""
+def machine(libraries: Sequence[str] = LIBRARIES) -> str:
+    """Python, the cores and the versions of libraries."""
     versions = []
-    for name in LIBRARIES:
+    for name in libraries:
         try:
             versions.append(f"{name} {version(name)}")
         except PackageNotFoundError:

@@ -38,8 +38,10 @@ def section(setting: Setting) -> list[str]:
     _remove(setting, "natural", side)
     rows += measured(setting, other, "shuffled", (*_WHOLE, *_HERE))
     _remove(setting, "shuffled", other)
+    sizes = [side]
     for n, ways in ((LARGE, (*_HERE, *_WORKERS)), (HUGE, _HERE)) if large else ():
         rows += measured(setting, n, "natural", ways)
+        sizes.append(n)
         _remove(setting, "natural", n)
     lines = [
         "A bumpy torus of quads from .npy files, the mean curvature by finite volumes into one. *Into parts*",
@@ -53,9 +55,20 @@ def section(setting: Setting) -> list[str]:
         "One of two workers killed after a third of the vertices: the result was bitwise the same.",
     ]
     if not large:
-        sizes = f"{LARGE**2 / 1e6:.3g}M and {HUGE**2 / 1e6:.3g}M"
-        lines += ["", f"{sizes} vertices: not measured; QUADCURV_LARGE=1 measures them."]
-    return lines
+        left = f"{LARGE**2 / 1e6:.3g}M and {HUGE**2 / 1e6:.3g}M"
+        return [*lines, "", f"{left} vertices: not measured; QUADCURV_LARGE=1 measures them."]
+    return [*lines, "", growth(sizes, rows)]
+
+
+def growth(sizes: Sequence[int], rows: Sequence[Sequence[object]]) -> str:
+    """How the cost grows from size to size of meshes in natural order, into parts and part by part."""
+    said = []
+    for way, _, _ in _HERE:
+        cpu = [float(str(row[2])) for row in rows if row[1] == way and str(row[0]).endswith("natural")]
+        slope = np.polyfit(np.log([n * n for n in sizes]), np.log(cpu), 1)[0]
+        said.append(f"{slope:.2f} {way}")
+    each = ", ".join(f"{n * n / 1e6:.3g}M" for n in sizes)
+    return f"Over {each} vertices processor time grows like their number to the power {' and '.join(said)}."
 
 
 def _remove(setting: Setting, order: str, n: int) -> None:

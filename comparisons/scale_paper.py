@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import shutil
 import time
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -13,22 +15,20 @@ from comparisons.scale import Setting, cost, table
 from comparisons.scale_grids import HERE as GRIDS
 from comparisons.scale_grids import H, write_points
 
-HERE = "comparisons.scale_paper"
+HERE, FACES = "comparisons.scale_paper", "comparisons.scale_faces"
 NODES, CORES, RATE = 256, 64, 2e9  # nodes, cores of each, bytes a second that each reads and writes
 VERTICES = 1e12
 TASK = 64e6  # vertices a task
 
 
-def faces_in_memory(points: str) -> None:
-    """Finite volumes on the face list of a grid, checked and sorted."""
-    small = qc.surfaces.cubed_sphere().sample((16, 16), "faces")[0]
-    qc.evaluate(small, H)
-    x = np.load(points)
-    n = len(x)
-    index = np.arange(n * n, dtype=np.int32).reshape(n, n)
-    quads = np.stack((index[:-1, :-1], index[1:, :-1], index[1:, 1:], index[:-1, 1:]), axis=-1).reshape(-1, 4)
+def quartic(points: str, out: str) -> None:
+    """Jets of degree four from file to file."""
+    scheme = qc.schemes.jet(4)
+    qc.evaluate(qc.ChunkedGrid(qc.surfaces.torus().sample((90, 90))[0].points), H, scheme=scheme)
     scale.begin()
-    qc.evaluate((x.reshape(-1, 3), quads), H)
+    x = np.load(points, mmap_mode="r")
+    into = np.lib.format.open_memmap(out, "w+", np.float64, x.shape[:2])
+    qc.evaluate(qc.ChunkedGrid(x), scheme=scheme, out={H: into})
 
 
 def scheduled(number: int) -> dict[str, Any]:
@@ -48,20 +48,33 @@ def scheduled(number: int) -> dict[str, Any]:
 def section(setting: Setting) -> list[str]:
     """Seconds on so many nodes, and what they rest on."""
     n = 256 if setting.quick else 2048
-    points, out = setting.folder / "paper.npy", setting.folder / "paper_out.npy"
-    write_points(points, n)
-    slabs = cost(f"{GRIDS}:in_slabs", str(points), str(out), "finite_volume").cpu / n**2
-    jets = cost(f"{GRIDS}:in_slabs", str(points), str(out), "jet").cpu / n**2
-    faces = cost(f"{HERE}:faces_in_memory", str(points)).cpu / n**2
+    points, out, mesh = (str(setting.folder / name) for name in ("paper.npy", "paper_out.npy", "paper"))
+    write_points(Path(points), n)
+    slabs, jets = (
+        cost(f"{GRIDS}:in_slabs", points, out, scheme).cpu / n**2 for scheme in ("finite_volume", "jet")
+    )
+    quartics = cost(f"{HERE}:quartic", points, out).cpu / n**2
+    cost(f"{FACES}:write", mesh, n, "natural")
+    into = cost(f"{FACES}:cut", mesh).cpu / n**2
+    parts = cost(f"{FACES}:by_parts", mesh, 0).cpu / n**2
     task = cost(f"{HERE}:scheduled", 200 if setting.quick else 4000).told["seconds"]
-    points.unlink()
-    out.unlink()
-    cores, moved = NODES * CORES, 32 * VERTICES / (NODES * RATE)
+    for path in (points, out):
+        Path(path).unlink()
+    shutil.rmtree(mesh)
+    cores, moved = NODES * CORES, VERTICES / (NODES * RATE)
     rows: list[tuple[object, ...]] = [
-        ("reading points, writing H: 32 bytes a vertex", "", moved),
-        ("finite volumes, grid in slabs", 1e9 * slabs, slabs * VERTICES / cores),
-        ("finite volumes, face list", 1e9 * faces, faces * VERTICES / cores),
-        ("jets, grid", 1e9 * jets, jets * VERTICES / cores),
+        ("grid: 24 bytes of a point read, 8 of H written", "", 32 * moved),
+        ("face list, also 16 of a face read, 20 written and read again", "", (32 + 16 + 40) * moved),
+        *(
+            (name, 1e9 * each, each * VERTICES / cores)
+            for name, each in (
+                ("finite volumes, grid in slabs", slabs),
+                ("finite volumes, face list: into parts", into),
+                ("finite volumes, face list: part by part", parts),
+                ("jets of degree four, grid", quartics),
+                ("jets as they are by default, grid", jets),
+            )
+        ),
         (
             f"one scheduler, {VERTICES / TASK:,.0f} tasks of {TASK / 1e6:g} million",
             "",
@@ -72,10 +85,11 @@ def section(setting: Setting) -> list[str]:
     text = (
         f"Nothing of this was run: 10^12 vertices on {NODES} nodes of {CORES} cores, each node reading and "
         f"writing {RATE / 1e9:g} GB a second. Processor time a vertex was measured here, on {n} x {n} "
-        f"vertices from file to file, faces in memory; a task's by {number} tasks that do nothing. Assumed "
-        "are cores as fast as these, none of which waits for memory or for another one; files that every "
-        "node reaches at its full rate; and tasks that share no more than the rows around them, 0.1 % of 64 "
-        "million vertices. Reading and writing then overlap with computing, and the largest row is what a "
-        "run takes."
+        f"vertices from file to file; a task's by {number} tasks that do nothing. Assumed are cores as fast "
+        "as these, none of which waits for memory or for another one; files that every node reaches at its "
+        "full rate; tasks that share no more than the rows around them, 0.1 % of 64 million vertices; and of "
+        "face lists that each node has a piece of the mesh whose indices 32 bits number, with the halo that "
+        "it shares with others, the order of vertices being good. Reading and writing then overlap with "
+        "computing, and the largest row is what a run takes."
     )
     return [text, "", *table(("what", "ns a vertex", "seconds"), rows)]

@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import os
-import platform
-from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
 import numpy as np
@@ -14,6 +11,7 @@ from comparisons import gpu
 from comparisons.figures import COLOURS, MARKERS, figure, paper_style, save_figure
 from comparisons.goals import Ratio
 from comparisons.operations import THESIS, operations
+from comparisons.scale import machine
 
 Times = dict[str, dict[int, dict[str, NDArray[np.float64]]]]
 PEERS = ("libigl", "vtk", "pymeshlab", "robust-laplacian", "scipy", "numpy", "numba")
@@ -22,17 +20,6 @@ PEERS = ("libigl", "vtk", "pymeshlab", "robust-laplacian", "scipy", "numpy", "nu
 def short(name: str) -> str:
     """A name as figures have it."""
     return name.replace("finite_volume", "FV").replace("liu", "Liu")
-
-
-def versions() -> str:
-    """Libraries that took part."""
-    found = []
-    for name in PEERS:
-        try:
-            found.append(f"{name} {version(name)}")
-        except PackageNotFoundError:
-            found.append(f"{name} not installed")
-    return ", ".join(found)
 
 
 def markdown(ratios: list[Ratio], times: Times, peak: dict[str, float], quick: bool = False) -> str:
@@ -57,7 +44,7 @@ def markdown(ratios: list[Ratio], times: Times, peak: dict[str, float], quick: b
         "each in a process of its own, in turn. Matrices of quads by *igl.cotmatrix* are those of triangles,",
         "of *igl.cotmatrix(V, I, C)* those of the quads themselves (Bunge's).",
         "",
-        f"Python {platform.python_version()}, {os.cpu_count()} cores, {versions()}.",
+        machine(PEERS),
         "",
         f"Floating-point operations a vertex: {counted['all']} "
         f"({', '.join(f'{n} {name}' for name, n in counted.items() if name != 'all')}); "

@@ -293,6 +293,50 @@ def test_results_into_files(tmp_path, small):
     assert equal(qc.mean_curvature(tmp_path / "x.h5", "liu"), open_)
 
 
+def test_what_results_must_not_be_written_to(tmp_path):
+    zarr, h5py = pytest.importorskip("zarr"), pytest.importorskip("h5py")
+    x = points("smooth", (False, False))
+    np.save(tmp_path / "x.npy", x)
+    z = zarr.create_array(store=tmp_path / "x.zarr", data=x, chunks=(20, 20, 3))
+
+    def refused(source, target, name="mean_curvature_normal", match="overlaps the memory"):
+        with pytest.raises(ValueError, match=f"out: {name} .*{match}"):
+            qc.evaluate(qc.ChunkedGrid(source), out={name: target})
+
+    def mapped(mode="r", name="x.npy"):
+        return np.load(tmp_path / name, mmap_mode=mode)
+
+    refused(mapped(), mapped("r+"))  # another view of the same file
+    refused(mapped()[5:30], mapped("r+")[10:35])
+    refused(z, zarr.open(tmp_path / "x.zarr", mode="r+"))
+    refused(z, zarr.open(tmp_path / "x.zarr", mode="r"), match="read-only")
+    refused(x, mapped(), match="read-only")
+    refused(x, "H.npy", match=r"got object of shape \(\) \(str\)")
+    with h5py.File(tmp_path / "x.h5", "w") as file:
+        file["points"], file["other"] = x, x
+        refused(file["points"], file["points"])
+        qc.evaluate(qc.ChunkedGrid(file["points"]), out={"mean_curvature_normal": file["other"]})
+        assert equal(file["other"][:], qc.mean_curvature_normal(qc.QuadGrid(x), "finite_volume"))
+    with h5py.File(tmp_path / "x.h5", "r") as file:
+        refused(x, file["other"], match="read-only")
+    # One file may hold both, apart.
+    both = np.memmap(tmp_path / "both.bin", np.float64, "w+", shape=(4, *x.shape[:2]))
+    both[:3] = x.reshape(3, *x.shape[:2])
+    source = np.memmap(tmp_path / "both.bin", np.float64, "r", shape=x.shape)
+    target = np.memmap(tmp_path / "both.bin", np.float64, "r+", 24 * 41 * 37, shape=x.shape[:2])
+    qc.evaluate(qc.ChunkedGrid(source), scheme="liu", out={"mean_curvature": target})
+    assert equal(both[3], qc.mean_curvature(qc.QuadGrid(x), "liu"))
+    assert equal(source, x)
+    refused(source, both[1], "mean_curvature")
+
+
+def test_sizes_that_dask_does_not_know():
+    da = pytest.importorskip("dask.array")
+    x = da.from_array(points("smooth", (False, False)))
+    with pytest.raises(qc.MeshError, match=r"points: of unknown size, .* compute_chunk_sizes\(\)"):
+        qc.ChunkedGrid(x[x[:, 0, 0] > 0])
+
+
 @pytest.mark.parametrize("most", [1, 90, 400])
 def test_grids_in_vtkhdf_files(tmp_path, monkeypatch, most):
     """From the points of a face list in the order of a grid, to its values."""

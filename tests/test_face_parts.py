@@ -379,8 +379,12 @@ def test_what_is_refused(tmp_path):
         qc.evaluate(parts, "k1", scheme="jet-auto")
     with pytest.raises(ValueError, match="wanted: expected some of"):
         qc.evaluate(parts, "k1", scheme="liu")
-    with pytest.raises(ValueError, match="out: mean_curvature wants floats of shape"):
+    with pytest.raises(ValueError, match="out: mean_curvature wants an array of floats of shape"):
         qc.evaluate(parts, out={"mean_curvature": np.zeros(3)})
+    np.save(tmp_path / "x.npy", points)
+    mapped = made(np.load(tmp_path / "x.npy", mmap_mode="r"), folder="f", parts=2)
+    with pytest.raises(ValueError, match="out: mean_curvature_normal overlaps the memory"):
+        qc.evaluate(mapped, out={"mean_curvature_normal": np.load(tmp_path / "x.npy", mmap_mode="r+")})
     with pytest.raises(ValueError, match="boundary: expected one of"):
         qc.evaluate(parts, "mean_curvature", boundary="none")
     assert repr(parts) == f"FaceParts({len(points)} points in 4 parts)"

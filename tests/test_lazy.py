@@ -256,6 +256,11 @@ def test_a_dataset_and_units():
     for variable in data.data_vars.values():
         variable.attrs["units"] = "km"
     assert qc.dual_areas(of(data), "liu").attrs["units"] == "km2"
+    for variable in data.data_vars.values():
+        variable.attrs["units"] = "earth radii"
+    assert qc.dual_areas(of(data), "liu").attrs["units"] == "(earth radii)2"
+    for variable in data.data_vars.values():
+        variable.attrs["units"] = "km"
     assert "units" not in qc.vertex_normals(of(data)).attrs
     data["x"].attrs["units"] = "m"
     with pytest.raises(qc.MeshError, match="coordinates in different units"):

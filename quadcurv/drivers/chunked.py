@@ -17,6 +17,7 @@ import numpy as np
 
 from quadcurv.boundary import checked_boundary
 from quadcurv.drivers import DOUBLE
+from quadcurv.drivers.targets import checked_target
 from quadcurv.drivers.tasks import BORDER, Task, with_holes
 from quadcurv.drivers.windows import (
     Cut,
@@ -320,16 +321,6 @@ def _arrays(task: Task, shape: tuple[int, ...], out: Mapping[str, Any], grid: Ch
         if name not in out:
             results[name] = np.empty(full)
             continue
-        array = out[name]
-        if (
-            not hasattr(array, "__setitem__")
-            or tuple(getattr(array, "shape", ())) != full
-            or np.dtype(getattr(array, "dtype", object)).kind != "f"
-        ):
-            raise ValueError(f"out: {name} wants an array of floats of shape {full} that can be written to")
-        for other in (grid.points, grid.dual, grid.mask, *results.values()):
-            both = isinstance(array, np.ndarray) and isinstance(other, np.ndarray)
-            if array is other or (both and np.may_share_memory(array, other)):
-                raise ValueError(f"out: {name} overlaps the memory of the grid or of another result")
-        results[name] = array
+        others = grid.points, grid.dual, grid.mask, *task.others, *results.values()
+        results[name] = checked_target(out[name], name, full, others)
     return results

@@ -13,6 +13,7 @@ from quadcurv import drivers
 from quadcurv.boundary import REACH, checked_boundary
 from quadcurv.checks import Finding
 from quadcurv.drivers import direct, fits
+from quadcurv.drivers.targets import checked_target
 from quadcurv.mesh import part_sides
 from quadcurv.mesh.face_parts import FaceParts
 from quadcurv.mesh.mapped import forget
@@ -181,10 +182,8 @@ def _arrays(mesh: FaceParts, wanted: Iterable[str], scheme: Scheme, out: Mapping
         if name not in known:
             raise ValueError(f"wanted: expected some of {', '.join(known)}, got {name!r}")
         full = mesh.shape + known[name]
-        array = out[name] if name in out else np.empty(full)
-        shape, dtype = getattr(array, "shape", ()), np.dtype(getattr(array, "dtype", object))
-        if not hasattr(array, "__setitem__") or tuple(shape) != full or dtype.kind != "f":
-            got = f"{type(array).__name__} of {dtype}, shape {tuple(shape)}"
-            raise ValueError(f"out: {name} wants floats of shape {full} that can be written to, got {got}")
-        results[name] = array
+        if name in out:
+            results[name] = checked_target(out[name], name, full, (mesh.points, *results.values()))
+        else:
+            results[name] = np.empty(full)
     return results

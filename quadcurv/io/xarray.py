@@ -116,13 +116,15 @@ def _labelled(values: Any, name: str, points: Any, in_order: Any, names: list[st
     dims, vector = list(in_order.dims[:-1]), names[2]
     more = values.ndim - len(dims)
     if more:
-        dims.append(vector if name in _VECTORS else "quantity" if name == "standard_error" else "function")
+        other = "quantity" if name in ("standard_error", "interval") else "function"
+        dims.append(vector if name in _VECTORS else other)
     kept = [d for d in points.dims if d in dims]
     coordinates = {key: own for key, own in points.coords.items() if set(own.dims) <= set(dims)}
     attributes = {"long_name": _NAMES.get(name, name.replace("_", " "))}
     if (unit := points.attrs.get("units")) and name in _POWERS:
         power = _POWERS[name]
-        attributes["units"] = unit if power == 1 else f"{unit}{power}"
+        base = unit if str(unit).isalpha() else f"({unit})"
+        attributes["units"] = unit if power == 1 else f"{base}{power}"
     found = xarray.DataArray(values, dims=dims, coords=coordinates, name=name, attrs=attributes)
     return found.transpose(*kept, *[d for d in dims if d not in kept])
 

@@ -164,6 +164,8 @@ def _check_array(array: Any, name: str, shape: tuple[Any, ...]) -> None:
     if isinstance(array, np.ma.MaskedArray):
         raise MeshError(f"{name}: a masked array; give its data, and its mask as mask=")
     given, wanted = tuple(array.shape), shape[1:]
+    if any(size != size for size in given):  # dask's for what it does not know
+        raise MeshError(f"{name}: of unknown size, {given}; its compute_chunk_sizes() finds out")
     if len(given) < len(wanted) or any(
         isinstance(w, int) and have != w for have, w in zip(given[-len(wanted) :], wanted, strict=True)
     ):

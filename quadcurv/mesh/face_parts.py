@@ -243,9 +243,11 @@ class FaceParts:
         """(k, 5): number and vertices of all faces with a vertex of part p; ~number where one is turned."""
         return part_files.read_faces(self.folder, p)
 
-    def _points(self, vertices: Indices) -> Any:
+    @property
+    def points(self) -> np.memmap:
+        """(n, 3), in the order of the parts: a file."""
         path, offset, dtype, shape = self._source
-        return np.take(np.asarray(np.memmap(path, dtype, "r", offset, shape)), vertices, axis=0)
+        return np.memmap(path, dtype, "r", offset, shape)
 
     def _given_numbers(self, vertices: Indices) -> Indices:
         if not self.renumbered:
@@ -283,7 +285,7 @@ class FaceParts:
         own[used] = place[before:last]
         table = kernels.placed(faces, begin, own, beyond, np.concatenate((place[:before], place[last:])))
         vertices = np.concatenate((origins, vertices))
-        points = checked_points(self._points(vertices), "points", ("n", 3))
+        points = checked_points(np.take(np.asarray(self.points), vertices, axis=0), "points", ("n", 3))
         connectivity = (connected or self._connected)(table, points, faces[:, 0] < 0)
         return QuadMesh.of(points, connectivity, self.roundoff), vertices
 

@@ -1,0 +1,72 @@
+"""Arrays of the caller's, in memory or on disk, that results are written to in slices."""
+
+from __future__ import annotations
+
+import mmap
+import os
+from collections.abc import Iterable
+from typing import Any
+
+import numpy as np
+
+
+def checked_target(array: Any, name: str, shape: tuple[int, ...], sources: Iterable[Any]) -> Any:
+    """An array of `out` that takes results of a shape, whatever their precision.
+
+    Raises
+    ------
+    ValueError
+        It does not, or it shares memory, or a place in a file, with what is read or with another result.
+    """
+    writeable = hasattr(array, "__setitem__") and not _is_read_only(array)
+    given, dtype = tuple(getattr(array, "shape", ())), np.dtype(getattr(array, "dtype", object))
+    if not writeable or given != shape or dtype.kind != "f":
+        kind = "array that is read-only" if _is_read_only(array) else type(array).__name__
+        raise ValueError(
+            f"out: {name} wants an array of floats of shape {shape} that can be written to, got {dtype} of "
+            f"shape {given} ({kind})"
+        )
+    if any(_share(array, other) for other in sources):
+        raise ValueError(f"out: {name} overlaps the memory of the grid or of another result")
+    return array
+
+
+def _is_read_only(array: Any) -> bool:
+    if isinstance(array, np.ndarray):
+        return not array.flags.writeable
+    file = getattr(array, "file", None)  # of h5py
+    return bool(getattr(array, "read_only", getattr(file, "mode", "") == "r"))
+
+
+def _share(one: Any, other: Any) -> bool:
+    if one is other:
+        return True
+    if isinstance(one, np.ndarray) and isinstance(other, np.ndarray):
+        return np.may_share_memory(one, other) or _share_a_file(one, other)
+    if type(one) is not type(other) or not hasattr(one, "name"):
+        return False
+    # Arrays of zarr and datasets of h5py know which one they are.
+    place = [(getattr(array, "store", getattr(array, "file", None)), array.name) for array in (one, other)]
+    return bool(place[0] == place[1])
+
+
+def _share_a_file(one: Any, other: Any) -> bool:
+    places = [_place(array) for array in (one, other)]
+    (file, begin, end), (other_file, other_begin, other_end) = places
+    if file is None or other_file is None or not os.path.samefile(file, other_file):
+        return False
+    return max(begin, other_begin) < min(end, other_end)
+
+
+def _place(array: Any) -> tuple[Any, int, int]:
+    """The file that an array is mapped from, and where in it the array begins and ends."""
+    base = array
+    while isinstance(base.base, np.ndarray):
+        base = base.base
+    if not isinstance(array, np.memmap) or not isinstance(base.base, mmap.mmap):
+        return None, 0, 0
+    # An offset is that of the file's first entry in memory, whatever slice of it this is.
+    mapped = np.frombuffer(base.base, np.uint8).__array_interface__["data"][0]
+    first = array.offset // mmap.ALLOCATIONGRANULARITY * mmap.ALLOCATIONGRANULARITY - mapped
+    low, high = np.lib.array_utils.byte_bounds(array)
+    return array.filename, first + low, first + high
