@@ -13,7 +13,7 @@ from quadcurv.ragged import Faces
 from quadcurv.stencils import Polygons
 from quadcurv.types import Bools, Floats, Indices, Ints, MeshError
 
-_LARGEST = 1e70
+LARGEST = 1e70
 _FINDINGS = {
     "collapsed": "face(s) with a repeated vertex, taken without the repetition",
     "dropped": "face(s) of fewer than three distinct vertices, left out",
@@ -135,15 +135,15 @@ def checked_points(points: ArrayLike, name: str, shape: tuple[Any, ...]) -> Floa
     if array.size:
         rows = array.reshape(-1, 3)
         # The square of an area, hence the fourth power of a length, must neither overflow nor vanish.
-        if size > _LARGEST:
-            first, count = _first_and_count((np.abs(rows) > _LARGEST).any(axis=1))
+        if size > LARGEST:
+            first, count = _first_and_count((np.abs(rows) > LARGEST).any(axis=1))
             raise MeshError(
-                f"{name}: {count} point(s) beyond {_LARGEST:g}, whose areas overflow, first vertex {first}"
+                f"{name}: {count} point(s) beyond {LARGEST:g}, whose areas overflow, first vertex {first}"
             )
-        if np.ptp(rows[:: len(rows) // 8 + 1], axis=0).max() < 1 / _LARGEST and (
-            0 < np.ptp(rows, axis=0).max() < 1 / _LARGEST
+        if np.ptp(rows[:: len(rows) // 8 + 1], axis=0).max() < 1 / LARGEST and (
+            0 < np.ptp(rows, axis=0).max() < 1 / LARGEST
         ):
-            raise MeshError(f"{name}: all within {1 / _LARGEST:g} of each other, where areas vanish")
+            raise MeshError(f"{name}: all within {1 / LARGEST:g} of each other, where areas vanish")
     return array
 
 
@@ -157,11 +157,11 @@ def _checked_on_device(points: Any, name: str, shape: tuple[Any, ...]) -> Any:
     ):
         raise MeshError(f"{name}: shape {given.shape}, expected ({', '.join(map(str, shape))})")
     array = given.astype(np.float64, order="C", copy=False)
-    good = (abs(array) <= _LARGEST).reshape(-1, 3).all(axis=1)
+    good = (abs(array) <= LARGEST).reshape(-1, 3).all(axis=1)
     if array.size and not bool(good.all()):
         bad = np.flatnonzero(~on_host(good))
         raise MeshError(
-            f"{name}: {bad.size} point(s) that are not finite or beyond {_LARGEST:g}, first vertex {bad[0]}"
+            f"{name}: {bad.size} point(s) that are not finite or beyond {LARGEST:g}, first vertex {bad[0]}"
         )
     return array
 

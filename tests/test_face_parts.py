@@ -222,6 +222,37 @@ def test_results_go_into_arrays_of_other_libraries(kind, mesh, tmp_path):
     np.testing.assert_array_equal(out["mean_curvature_normal"][:], expected["mean_curvature_normal"])
 
 
+@pytest.mark.parametrize("order", [lambda *mesh: mesh, shuffled])
+def test_rounding_is_told_of(order, tmp_path):
+    mesh = qc.surfaces.cubed_sphere().sample((24, 24), "faces")[0]
+    points, faces = order((mesh.points + 1000).astype(np.float32), mesh.faces)
+    parts = qc.FaceParts(points, faces, tmp_path / "parts", parts=3)
+    for verb in (qc.mean_curvature, qc.mean_curvature_normal):
+        with pytest.warns(qc.PrecisionWarning) as whole:
+            verb(qc.QuadMesh(points, faces), "liu")
+        with pytest.warns(qc.PrecisionWarning) as said:
+            verb(parts, "liu")
+        assert said[0].filename == __file__
+        assert str(said[0].message) == str(whole[0].message)
+    with pytest.warns(qc.PrecisionWarning):
+        qc.evaluate(parts, "gaussian_curvature", scheme="jet-2")
+
+
+def test_slivers_of_rounded_positions(tmp_path):
+    """No area but for the rounding of all positions, the largest of which another part has."""
+    points, faces = sheet(20, 12)
+    points = points.astype(np.float32)
+    points[36:48] = points[48:60] + np.float32([1e-4, 0, 0])
+    points[-30:, 0] += 9000
+    one = qc.evaluate(qc.QuadMesh(points, faces), *WANTED)
+    assert np.isnan(one["mean_curvature"][40])
+    assert not np.isnan(qc.evaluate(qc.QuadMesh(points[:-60], faces[:150]), *WANTED)["mean_curvature"][40])
+    parts = qc.FaceParts(points, faces, tmp_path / "parts", parts=5)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", qc.PrecisionWarning)
+        check(one, qc.evaluate(parts, *WANTED))
+
+
 def test_isolated_vertices_and_parts_without_faces(tmp_path):
     points, faces = MESHES["closed"]
     points = np.concatenate((points, np.full((200, 3), 9.0)))
@@ -368,7 +399,7 @@ def test_what_is_refused(tmp_path):
         made(faces=wrong, folder="a", parts=2)
     lost = points.copy()
     lost[60, 1] = np.inf
-    with pytest.raises(qc.MeshError, match=r"1 non-finite point.* first vertex 60"):
+    with pytest.raises(qc.MeshError, match=r"1 point.* not finite, or beyond 1e\+70, first vertex 60"):
         made(points=lost, folder="b", parts=2)
     (tmp_path / "c").mkdir()
     (tmp_path / "c" / "file").touch()
@@ -385,6 +416,8 @@ def test_what_is_refused(tmp_path):
     mapped = made(np.load(tmp_path / "x.npy", mmap_mode="r"), folder="f", parts=2)
     with pytest.raises(ValueError, match="out: mean_curvature_normal overlaps the memory"):
         qc.evaluate(mapped, out={"mean_curvature_normal": np.load(tmp_path / "x.npy", mmap_mode="r+")})
+    with pytest.raises(ValueError, match="out: expected a mapping"):
+        qc.evaluate(parts, out=[1])
     with pytest.raises(ValueError, match="boundary: expected one of"):
         qc.evaluate(parts, "mean_curvature", boundary="none")
     assert repr(parts) == f"FaceParts({len(points)} points in 4 parts)"

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import fields
 from typing import Any, NamedTuple
 
@@ -17,6 +17,7 @@ from quadcurv.drivers.targets import checked_target
 from quadcurv.mesh import part_sides
 from quadcurv.mesh.face_parts import FaceParts
 from quadcurv.mesh.mapped import forget
+from quadcurv.precision import error_at_edges, warn_of_error
 from quadcurv.schemes import Fit, Laplacian, Scheme
 from quadcurv.types import Floats, Indices, MeshError, MeshWarning
 
@@ -46,6 +47,8 @@ def evaluate(
 ) -> dict[str, Any]:
     """Results by name, into arrays of `out` where there are any; see `FaceParts`."""
     checked_boundary(boundary)
+    if out is not None and not isinstance(out, Mapping):
+        raise ValueError(f"out: expected a mapping from names to arrays, got {type(out).__name__}")
     if isinstance(scheme, Fit) and scheme.name == "jet-auto":
         raise ValueError("scheme: jet-auto chooses for a mesh as a whole, which parts do not see")
     results = _arrays(mesh, wanted, scheme, {} if out is None else out)
@@ -56,7 +59,18 @@ def evaluate(
         said = _by_parts(mesh, scheme, boundary, results)
     if said:
         warnings.warn("; ".join(said), MeshWarning, stacklevel=3)
+    for name in results.keys() & _CURVATURES.keys():
+        H = _CURVATURES[name](np.asarray(results[name][:]))
+        warn_of_error(*error_at_edges(*mesh.some_edges(), mesh.roundoff), mesh.roundoff, H, 4)
+        break
     return results
+
+
+# What tells how large H is, should its rounding have to be told of.
+_CURVATURES: dict[str, Callable[[Floats], Floats]] = {
+    **dict.fromkeys(("mean_curvature", "mean_curvature_normal", "k1", "k2"), lambda values: values),
+    "gaussian_curvature": lambda values: np.sqrt(np.abs(values)),
+}
 
 
 def _by_parts(mesh: FaceParts, scheme: Scheme, boundary: str, results: dict[str, Any]) -> list[str]:
@@ -147,7 +161,7 @@ def part_results(mesh: FaceParts, p: int, job: _Job, alone: bool = False) -> Ans
             results["dual_areas"][:] = 0
         return owned, results, ""
     if isinstance(scheme, Laplacian):
-        found = drivers.run(part.mesh, scheme, wanted, boundary)
+        found = drivers.run(part.mesh, scheme, wanted, boundary, size=mesh.largest)
         if "dual_areas" in results:
             results["dual_areas"][:] = 0  # of isolated vertices, which no face has told of
     else:

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from quadcurv.checks import checked_points
+from quadcurv.checks import LARGEST, checked_points
 from quadcurv.mesh import ChunkedGrid, QuadGrid, StaggeredGrid
 from quadcurv.mesh.chunked import part
 from quadcurv.mesh.mapped import forget
@@ -201,7 +201,7 @@ def _checked(
         return checked_points(points, name, (None, None, 3))
     except MeshError:
         x = np.asarray(points)
-        bad = ~(np.abs(x, where=np.isfinite(x), out=np.full(x.shape, np.inf)) <= _LARGEST).all(axis=2)
+        bad = ~(np.abs(x, where=np.isfinite(x), out=np.full(x.shape, np.inf)) <= LARGEST).all(axis=2)
         if not bad.any():
             raise
         count, first = int(np.count_nonzero(bad)), np.argwhere(bad)[0]
@@ -211,16 +211,13 @@ def _checked(
             nan = [int((k + start) % size) for k, start, size in zip(first, at, extent, strict=True)]
             raise HoleError((nan[0], nan[1])) from None
         size = (
-            f"beyond {_LARGEST:g}, whose areas overflow"
+            f"beyond {LARGEST:g}, whose areas overflow"
             if np.isfinite(x[tuple(first)]).all()
             else "non-finite"
         )
         raise MeshError(
             f"{name}: {count} point(s) of the block read {size}, first vertex {place}: {x[tuple(first)]}"
         ) from None
-
-
-_LARGEST = 1e70
 
 
 def _with_holes(

@@ -110,6 +110,7 @@ class FaceParts:
     largest: float
     client: Any
     _source: tuple[str, int, str, tuple[int, ...]]
+    _sample: Ints
 
     def __init__(
         self,
@@ -145,7 +146,8 @@ class FaceParts:
             folder=place, shape=(n,), cuts=cuts, renumbered=renumbered, client=client,
             roundoff=unit_roundoff(points), largest=largest, _source=source,
         )  # fmt: skip
-        self.__dict__["has_triangles"] = part_files.write_parts(faces, n, cuts, number, place)
+        triangles, sample = part_files.write_parts(faces, n, cuts, number, place)
+        self.__dict__.update(has_triangles=triangles, _sample=sample)
 
     def __repr__(self) -> str:
         return f"FaceParts({self.shape[0]} points in {self.parts} parts)"
@@ -242,6 +244,11 @@ class FaceParts:
     def faces_of(self, p: int) -> Ints:
         """(k, 5): number and vertices of all faces with a vertex of part p; ~number where one is turned."""
         return part_files.read_faces(self.folder, p)
+
+    def some_edges(self) -> tuple[Any, Any]:
+        """Ends (k, 3), (k, 3) of edges of some faces."""
+        corners = np.asarray(self.points[self._sample.ravel()], np.float64).reshape(-1, 3, 3)
+        return corners[:, :2].reshape(-1, 3), corners[:, 1:].reshape(-1, 3)
 
     @property
     def points(self) -> np.memmap:

@@ -9,12 +9,13 @@ from typing import Any
 
 import numpy as np
 
-from quadcurv.checks import refuse_on_device
+from quadcurv.checks import LARGEST, refuse_on_device
 from quadcurv.mesh.mapped import forget
 from quadcurv.types import Indices, Ints, MeshError
 
 CHUNK = 1 << 20  # vertices or faces that are read at a time
 _SAMPLE = 200_000  # of the points, by which space is divided
+_SIDES = 512  # faces, whose sides tell what rounding costs
 _SCATTERED = 1.3  # parts that a face has vertices of, on average, from which on the order of vertices is bad
 
 
@@ -51,11 +52,11 @@ def largest(points: Any) -> float:
     found = 0.0
     for begin, x in _chunks(points):
         size = extent.largest(np.asarray(x, np.float64))
-        if not size < np.inf:
-            bad = ~np.isfinite(x).all(axis=1)
+        if not size <= LARGEST:
+            bad = ~(np.abs(np.asarray(x, np.float64)) <= LARGEST).all(axis=1)
             raise MeshError(
-                f"points: {np.count_nonzero(bad)} non-finite point(s) among those from {begin} on, first "
-                f"vertex {begin + int(np.argmax(bad))}"
+                f"points: {np.count_nonzero(bad)} point(s) from {begin} on that are not finite, or "
+                f"beyond {LARGEST:g}, first vertex {begin + int(np.argmax(bad))}"
             )
         found = max(found, size)
     return found
@@ -171,20 +172,29 @@ def write_turned(place: Path, p: int, turned: Indices) -> None:
     file.flush()
 
 
-def write_parts(faces: Any, n: int, cuts: Indices, number: Ints, place: Path) -> bool:
-    """Write to a file a part all faces with a vertex of it, in their order; whether any is a triangle."""
+def write_parts(faces: Any, n: int, cuts: Indices, number: Ints, place: Path) -> tuple[bool, Ints]:
+    """Write to a file a part all faces with a vertex of it, in their order.
+
+    Returns
+    -------
+    has_triangles : bool
+    sample : (k, 3) int32
+        First three vertices of some faces, by their new numbers if there are any.
+    """
     from quadcurv.kernels.parts import by_part
 
-    has_triangles = False
+    has_triangles, step, sample = False, int(faces.shape[0]) // _SIDES + 1, []
     files = [open(place / f"faces{p}.bin", "wb") for p in range(len(cuts) - 1)]  # noqa: SIM115
     try:
         for begin, x in _chunks(faces):
             table = _as_table(x, n, begin)
             has_triangles |= bool((table[:, 3] < 0).any())
+            sample.append(table[-begin % step :: step, :3])
             out, first = by_part(table, begin, cuts, number)
             for p in np.flatnonzero(np.diff(first)).tolist():
                 files[p].write(memoryview(out[first[p] : first[p + 1]]).cast("B"))
     finally:
         for file in files:
             file.close()
-    return has_triangles
+    some = np.concatenate(sample)
+    return has_triangles, number[some] if number.size else some
