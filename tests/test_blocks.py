@@ -400,6 +400,8 @@ def test_what_is_refused(case):
 
 
 def test_kinds_and_ghost_cells_are_refused():
+    with pytest.raises(qc.MeshError, match=r"blocks\[0\]: a ChunkedGrid, blocks are in memory"):
+        qc.GridBlocks([qc.ChunkedGrid(np.zeros((4, 4, 3)))])
     grid = qc.StaggeredGrid.from_mapping(torus().mapping, spread(8), spread(8))
     with pytest.raises(qc.MeshError, match=r"blocks\[0\]: has ghost cells"):
         qc.GridBlocks([grid])

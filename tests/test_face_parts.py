@@ -11,6 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import quadcurv as qc
+from quadcurv import drivers
 from quadcurv.kernels import parts as kernels
 from quadcurv.mesh import part_files
 from quadcurv.surfaces import cubed_ellipsoid, torus
@@ -238,6 +239,13 @@ def test_rounding_is_told_of(order, tmp_path):
         qc.evaluate(parts, "gaussian_curvature", scheme="jet-2")
 
 
+def test_progress_is_shown(tmp_path, capsys):
+    points, faces = MESHES["closed"]
+    parts = qc.FaceParts(points, faces, tmp_path / "parts", parts=3)
+    drivers.face_parts.evaluate(parts, ["mean_curvature"], qc.SCHEMES["liu"], progress=True)
+    assert "parts" in capsys.readouterr().err
+
+
 def test_slivers_of_rounded_positions(tmp_path):
     """No area but for the rounding of all positions, the largest of which another part has."""
     points, faces = sheet(20, 12)
@@ -416,6 +424,11 @@ def test_what_is_refused(tmp_path):
     mapped = made(np.load(tmp_path / "x.npy", mmap_mode="r"), folder="f", parts=2)
     with pytest.raises(ValueError, match="out: mean_curvature_normal overlaps the memory"):
         qc.evaluate(mapped, out={"mean_curvature_normal": np.load(tmp_path / "x.npy", mmap_mode="r+")})
+    with pytest.raises(qc.MeshError, match=r"client: expected a distributed\.Client, got str"):
+        made(folder="g", client="local")
+    for verb in (qc.stiffness_matrix, qc.as_mesh, lambda mesh: qc.laplace_beltrami(mesh, points)):
+        with pytest.raises(TypeError, match=r"is computed part by part, which qc\.evaluate does"):
+            verb(parts)
     with pytest.raises(ValueError, match="out: expected a mapping"):
         qc.evaluate(parts, out=[1])
     with pytest.raises(ValueError, match="boundary: expected one of"):

@@ -17,6 +17,7 @@ import numpy as np
 
 from quadcurv.boundary import checked_boundary
 from quadcurv.drivers import DOUBLE
+from quadcurv.drivers.progress import tracked
 from quadcurv.drivers.targets import checked_target
 from quadcurv.drivers.tasks import BORDER, Task, with_holes
 from quadcurv.drivers.windows import (
@@ -226,7 +227,7 @@ def _by_blocks(
         task = with_holes(task)
     found = blocks(grid, _MOST_SMALL if task.small else _MOST, task.small)
     halo = task.reach + MARGIN
-    for (a, b), (c, d) in _tracked(found, progress):
+    for (a, b), (c, d) in tracked(found, "blocks", len(found), progress):
         rows, columns = (
             Cut.around(own, size, wraps, halo)
             for own, size, wraps in zip(((a, b), (c, d)), grid.shape, grid.wrap, strict=True)
@@ -272,15 +273,6 @@ def _target(result: Any, rows: Range, columns: Range, more: tuple[int, ...]) -> 
         if place.flags.c_contiguous and place.flags.writeable:
             return place
     return np.empty((rows[1] - rows[0], columns[1] - columns[0], *more))
-
-
-def _tracked(found: list[tuple[Range, Range]], progress: bool) -> Any:
-    if not progress:
-        return found
-    from rich.console import Console
-    from rich.progress import track
-
-    return track(found, "blocks", console=Console(stderr=True))
 
 
 def _check_seams(grid: ChunkedGrid) -> None:

@@ -13,6 +13,7 @@ from quadcurv import drivers
 from quadcurv.boundary import REACH, checked_boundary
 from quadcurv.checks import Finding
 from quadcurv.drivers import direct, fits
+from quadcurv.drivers.progress import tracked
 from quadcurv.drivers.targets import checked_target
 from quadcurv.mesh import part_sides
 from quadcurv.mesh.face_parts import FaceParts
@@ -44,6 +45,7 @@ def evaluate(
     scheme: Scheme,
     boundary: str = "extrapolate",
     out: Mapping[str, Any] | None = None,
+    progress: bool = False,
 ) -> dict[str, Any]:
     """Results by name, into arrays of `out` where there are any; see `FaceParts`."""
     checked_boundary(boundary)
@@ -53,10 +55,10 @@ def evaluate(
         raise ValueError("scheme: jet-auto chooses for a mesh as a whole, which parts do not see")
     results = _arrays(mesh, wanted, scheme, {} if out is None else out)
     try:
-        said = _by_parts(mesh, scheme, boundary, results)
+        said = _by_parts(mesh, scheme, boundary, results, progress)
     except part_sides.SidesError:
         part_sides.find(mesh)
-        said = _by_parts(mesh, scheme, boundary, results)
+        said = _by_parts(mesh, scheme, boundary, results, progress)
     if said:
         warnings.warn("; ".join(said), MeshWarning, stacklevel=3)
     for name in results.keys() & _CURVATURES.keys():
@@ -73,13 +75,15 @@ _CURVATURES: dict[str, Callable[[Floats], Floats]] = {
 }
 
 
-def _by_parts(mesh: FaceParts, scheme: Scheme, boundary: str, results: dict[str, Any]) -> list[str]:
+def _by_parts(
+    mesh: FaceParts, scheme: Scheme, boundary: str, results: dict[str, Any], progress: bool
+) -> list[str]:
     """Compute part by part; what there is to warn of."""
     said: list[str] = []
     # Flaps of triangles are computed relative to the first irregular vertex.
     seen_from = mesh.first_irregular() if mesh.has_triangles and _is_fast(scheme) else None
     job = _Job(tuple(results), scheme, boundary, seen_from)
-    for at, found, warned in _answers(mesh, job):
+    for at, found, warned in tracked(_answers(mesh, job), "parts", mesh.parts, progress):
         for name, values in found.items():
             results[name][at] = values
             if isinstance(at, slice):

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from quadcurv.checks import refuse_on_device
+from quadcurv.mesh.chunked import ChunkedGrid
 from quadcurv.mesh.connections import (
     SIDES,
     Connection,
@@ -308,6 +309,8 @@ def _checked_blocks(blocks: Iterable[Any]) -> list[Any]:
         raise MeshError("blocks: none given")
     grids: list[QuadGrid | StaggeredGrid] = []
     for b, block in enumerate(given):
+        if isinstance(block, ChunkedGrid):
+            raise MeshError(f"blocks[{b}]: a ChunkedGrid, blocks are in memory: QuadGrid(points[:])")
         try:
             grids.append(block if isinstance(block, QuadGrid | StaggeredGrid) else QuadGrid(block))
             if isinstance(grids[-1], QuadGrid):

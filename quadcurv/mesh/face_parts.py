@@ -128,6 +128,8 @@ class FaceParts:
             parts = max(1, n // _VERTICES)
         if isinstance(parts, bool) or not isinstance(parts, int | np.integer) or not 1 <= parts <= n:
             raise MeshError(f"parts: expected a whole number from 1 to {n}, got {parts!r}")
+        if client is not None and not hasattr(client, "submit"):
+            raise MeshError(f"client: expected a distributed.Client, got {type(client).__name__}")
         place = Path(folder)
         place.mkdir(parents=True, exist_ok=True)
         if any(place.iterdir()):
