@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from itertools import product
+from itertools import pairwise, product
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -136,7 +136,13 @@ def taken(
 
 
 def _slice(array: Any, rows: slice, columns: slice) -> Any:
-    """A slice; of less than rows of a file mapped into memory a copy, the file being let go of."""
+    """A slice; of less than rows of a file mapped into memory a copy, the file being let go of.
+
+    Of chunks a few are read at a time: an array holds, decoded, all those that a slice of it touches.
+    """
+    chunks = getattr(array, "chunks", None)
+    if chunks and isinstance(chunks[0], int):
+        return _slice_of_chunks(array, rows.indices(array.shape[0])[:2], columns.indices(array.shape[1])[:2])
     if not isinstance(array, np.memmap) or array[:1, columns].shape[1] == array.shape[1]:
         return array[rows, columns]
     begin, end, _ = rows.indices(array.shape[0])
@@ -149,6 +155,26 @@ def _slice(array: Any, rows: slice, columns: slice) -> Any:
 
 
 _MAPPED = 2**25  # bytes of a file in memory at a time
+_DECODED = 2**25  # bytes of chunks
+
+
+def _slice_of_chunks(array: Any, rows: Range, columns: Range) -> Any:
+    tall, wide = array.chunks[:2]
+    size = int(np.prod(array.chunks)) * array.dtype.itemsize
+    across = (columns[1] - 1) // wide - columns[0] // wide + 1
+    at_once = max(1, _DECODED // (size * across))
+    found = np.empty((rows[1] - rows[0], columns[1] - columns[0], *array.shape[2:]), array.dtype)
+    for a, b in _cut_at(rows, tall * at_once):
+        for c, d in _cut_at(columns, wide * max(1, _DECODED // size)):
+            found[a - rows[0] : b - rows[0], c - columns[0] : d - columns[0]] = array[a:b, c:d]
+    return found
+
+
+def _cut_at(whole: Range, step: int) -> list[Range]:
+    """A range cut at multiples of a number."""
+    begin, end = whole
+    cuts = [begin, *range((begin // step + 1) * step, end, step), end]
+    return list(pairwise(cuts)) if end > begin else []
 
 
 def arrays_of(grid: ChunkedGrid, rows: Cut, columns: Cut, concatenate: Any = np.concatenate) -> list[Any]:
