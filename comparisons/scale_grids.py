@@ -236,8 +236,8 @@ def dask_section(setting: Setting) -> list[str]:
         points.unlink()
     text = (
         "The finite-volume scheme from a zarr array to another, not compressed. Slabs are blocks of whole "
-        "chunks, one after the other; with dask a task reads its chunk and what lies around it. A slice of "
-        "zarr holds, decoded, all chunks that it touches, nine around one: peaks grow with the chunks."
+        "chunks, one after the other; with dask a task reads its chunk and what lies around it. Chunks "
+        "are held decoded, of 12 to 25 MB here: peaks grow with them."
     )
     return [text, "", *table(("chunks", "vertices", "CPU s", "ns a vertex", "peak MB", "tasks"), rows)]
 

@@ -264,6 +264,27 @@ def test_what_is_read_at_a_time(monkeypatch):
     assert array.most <= (400 + 8 * 30) * 3
 
 
+def test_few_chunks_are_read_at_a_time(monkeypatch):
+    """An array on disk holds, decoded, all chunks that a slice touches."""
+    monkeypatch.setattr(chunked, "_MOST", 300)
+    monkeypatch.setattr(windows, "_DECODED", 2 * 13 * 7 * 3 * 8)
+    touched = []
+
+    class Counted(Chunks):
+        def __getitem__(self, index):
+            ends = [s.indices(n)[:2] for s, n in zip(index, self.shape, strict=False)]
+            spans = [(b - 1) // n - a // n + 1 for (a, b), n in zip(ends, self.chunks, strict=False)]
+            touched.append(spans[0] * spans[1])
+            return super().__getitem__(index)
+
+    for wrap in WRAPS:
+        x = points("rough", wrap)
+        slabs = qc.evaluate(qc.ChunkedGrid(Counted(x, (13, 7, 3)), wrap), *NAMES, scheme="liu")
+        whole = qc.evaluate(qc.QuadGrid(x, wrap), *NAMES, scheme="liu")
+        assert all(equal(whole[name], slabs[name]) for name in NAMES)
+    assert max(touched) == 2
+
+
 def test_results_into_files(tmp_path, small):
     zarr, h5py = pytest.importorskip("zarr"), pytest.importorskip("h5py")
     x, wrap = points("rough", (False, True)), (False, True)
