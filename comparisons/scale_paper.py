@@ -32,7 +32,7 @@ def quartic(points: str, out: str) -> None:
 
 
 def scheduled(number: int) -> dict[str, Any]:
-    """Processor seconds a task of the process of a scheduler of dask.distributed, of tasks that do nothing."""
+    """Processor seconds that a scheduler of dask.distributed takes for a task that does nothing."""
     from distributed import Client, LocalCluster
 
     with (
@@ -87,9 +87,9 @@ def section(setting: Setting) -> list[str]:
         f"writing {RATE / 1e9:g} GB a second. Processor time a vertex was measured here, on {n} x {n} "
         f"vertices from file to file; a task's, of the process that schedules it, by {number} tasks that do "
         "nothing. Assumed are cores as fast as these, none of which waits for memory or for another one; "
-        "files that every node reaches at its full rate; tasks that share no more than the rows around them, 0.1 % of 64 million vertices; and of "
-        "face lists that each node has a piece of the mesh whose indices 32 bits number, with the halo that "
-        "it shares with others, the order of vertices being good. Reading and writing then overlap with "
-        "computing, and the largest row is what a run takes."
+        "files that every node reaches at its full rate; tasks that share no more than the rows around them, "
+        "0.1 % of 64 million vertices; and of face lists that each node has a piece of the mesh whose "
+        "indices 32 bits number, with the halo that it shares with others, the order of vertices being good. "
+        "Reading and writing then overlap with computing, and the largest row is what a run takes."
     )
     return [text, "", *table(("what", "ns a vertex", "seconds"), rows)]

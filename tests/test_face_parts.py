@@ -11,7 +11,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import quadcurv as qc
-from quadcurv import drivers
 from quadcurv.kernels import parts as kernels
 from quadcurv.mesh import part_files
 from quadcurv.surfaces import cubed_ellipsoid, torus
@@ -104,7 +103,15 @@ def test_fits_are_bitwise_one_mesh(mesh, tmp_path):
             found = qc.curvatures(qc.QuadMesh(points, faces), scheme, boundary)
             one = {name: getattr(found, name) for name in ("k1", "k2", "direction1", "direction2", "normal")}
             one |= {"mean_curvature": found.mean, "gaussian_curvature": found.gaussian}
+            one |= {name: getattr(found, name) for name in ("noise", "degree", "rings")}
+            if scheme == "jet":
+                one |= {name: stacked(getattr(found, name)) for name in ("standard_error", "interval")}
+                one["feature"] = found.feature
             check(one, qc.evaluate(parts, *one, scheme=scheme, boundary=boundary))
+
+
+def stacked(errors):
+    return np.stack(errors, axis=-1)
 
 
 @pytest.mark.slow
@@ -236,16 +243,17 @@ def test_rounding_is_told_of(order, tmp_path):
         assert said[0].filename == __file__
         assert str(said[0].message) == str(whole[0].message)
     with pytest.warns(qc.PrecisionWarning):
-        qc.evaluate(parts, "gaussian_curvature", scheme="jet-2")
+        qc.principal_curvatures(parts, "jet-2")
 
 
 def test_progress_is_shown(tmp_path, capsys):
     points, faces = MESHES["closed"]
     parts = qc.FaceParts(points, faces, tmp_path / "parts", parts=3)
-    drivers.face_parts.evaluate(parts, ["mean_curvature"], qc.SCHEMES["liu"], progress=True)
+    qc.evaluate(parts, "mean_curvature", progress=True)
     assert "parts" in capsys.readouterr().err
 
 
+@pytest.mark.filterwarnings("ignore::quadcurv.PrecisionWarning")
 def test_slivers_of_rounded_positions(tmp_path):
     """No area but for the rounding of all positions, the largest of which another part has."""
     points, faces = sheet(20, 12)
@@ -256,9 +264,7 @@ def test_slivers_of_rounded_positions(tmp_path):
     assert np.isnan(one["mean_curvature"][40])
     assert not np.isnan(qc.evaluate(qc.QuadMesh(points[:-60], faces[:150]), *WANTED)["mean_curvature"][40])
     parts = qc.FaceParts(points, faces, tmp_path / "parts", parts=5)
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", qc.PrecisionWarning)
-        check(one, qc.evaluate(parts, *WANTED))
+    check(one, qc.evaluate(parts, *WANTED))
 
 
 def test_isolated_vertices_and_parts_without_faces(tmp_path):

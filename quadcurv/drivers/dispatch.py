@@ -23,7 +23,7 @@ def results(
 ) -> dict[str, Any]:
     """Results by name, of whatever holds a mesh, into arrays of `out` where there are any."""
     if isinstance(mesh, FaceParts):
-        return face_parts.evaluate(mesh, wanted, scheme, boundary, out)
+        return face_parts.evaluate(mesh, wanted, scheme, boundary, out, progress)
     mesh = parts.in_parts(taken(mesh), scheme)
     if isinstance(mesh, ChunkedGrid):
         return parts.evaluate(mesh, wanted, scheme, boundary, out, progress)

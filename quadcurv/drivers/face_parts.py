@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import warnings
-from collections.abc import Callable, Iterable, Iterator, Mapping
-from dataclasses import fields
+from collections.abc import Iterable, Iterator, Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -12,7 +10,7 @@ import numpy as np
 from quadcurv import drivers
 from quadcurv.boundary import REACH, checked_boundary
 from quadcurv.checks import Finding
-from quadcurv.drivers import direct, fits
+from quadcurv.drivers import answers, fits
 from quadcurv.drivers.progress import tracked
 from quadcurv.drivers.targets import checked_target
 from quadcurv.mesh import part_sides
@@ -20,23 +18,15 @@ from quadcurv.mesh.face_parts import FaceParts
 from quadcurv.mesh.mapped import forget
 from quadcurv.precision import error_at_edges, warn_of_error
 from quadcurv.schemes import Fit, Laplacian, Scheme
-from quadcurv.types import Floats, Indices, MeshError, MeshWarning
+from quadcurv.types import Floats, Indices, MeshError, warn
 
 # Rings of faces around vertices whose rings are not regular. Closing a ring looks REACH faces far, at fits to
 # the residuals of others two rings away, which look as far; and all must know which rings are closed where
 # they end. A fit of up to five rings looks beyond borders as these do, and chooses by what others find up to
 # six rings away.
 _RINGS, _FIT_RINGS = 3 * REACH + 1, 6 * REACH
-_OF_FITS: dict[str, tuple[int, ...]] = {
-    "mean_curvature": (),
-    "mean_curvature_normal": (3,),
-    "gaussian_curvature": (),
-    "k1": (),
-    "k2": (),
-    "direction1": (3,),
-    "direction2": (3,),
-    "normal": (3,),
-}
+_COUNTS = ("dual_areas", "degree", "rings", "feature")
+_LOOKED_AT = 1 << 20  # vertices, of whose H rounding is told
 
 
 def evaluate(
@@ -60,19 +50,12 @@ def evaluate(
         part_sides.find(mesh)
         said = _by_parts(mesh, scheme, boundary, results, progress)
     if said:
-        warnings.warn("; ".join(said), MeshWarning, stacklevel=3)
-    for name in results.keys() & _CURVATURES.keys():
-        H = _CURVATURES[name](np.asarray(results[name][:]))
-        warn_of_error(*error_at_edges(*mesh.some_edges(), mesh.roundoff), mesh.roundoff, H, 4)
+        warn("; ".join(said))
+    for name in results.keys() & {"mean_curvature", "mean_curvature_normal", "k1"}:
+        some = np.asarray(results[name][:: mesh.shape[0] // _LOOKED_AT + 1])
+        warn_of_error(*error_at_edges(*mesh.some_edges(), mesh.roundoff), mesh.roundoff, some)
         break
     return results
-
-
-# What tells how large H is, should its rounding have to be told of.
-_CURVATURES: dict[str, Callable[[Floats], Floats]] = {
-    **dict.fromkeys(("mean_curvature", "mean_curvature_normal", "k1", "k2"), lambda values: values),
-    "gaussian_curvature": lambda values: np.sqrt(np.abs(values)),
-}
 
 
 def _by_parts(
@@ -158,33 +141,22 @@ def part_results(mesh: FaceParts, p: int, job: _Job, alone: bool = False) -> Ans
     owned = mesh.owned(p)
     size = int(mesh.cuts[p + 1] - mesh.cuts[p])
     results = {
-        name: np.full((size, *(_OF_FITS if is_fit else direct.PER_VERTEX)[name]), np.nan) for name in wanted
+        name: np.full((size, *shape), 0.0 if name in _COUNTS else np.nan)  # of isolated vertices
+        for name, shape in answers.shapes(scheme, wanted).items()
     }
     if part is None:
-        if "dual_areas" in results:
-            results["dual_areas"][:] = 0
         return owned, results, ""
     if isinstance(scheme, Laplacian):
         found = drivers.run(part.mesh, scheme, wanted, boundary, size=mesh.largest)
-        if "dual_areas" in results:
-            results["dual_areas"][:] = 0  # of isolated vertices, which no face has told of
     else:
         around = fits.MeshNeighbourhoods(part.mesh, boundary)
         around.rounding = fits.ROUNDING * mesh.largest
-        found = _named(fits.fit_around(around, scheme), wanted)
+        curvatures = fits.fit_around(around, scheme)
+        found = {name: answers.FITTED[name][1](curvatures) for name in wanted}
     place = part.vertices - owned.start if isinstance(owned, slice) else _places(owned, part.vertices)
     for name, values in found.items():
         results[name][place] = values[part.own]
     return owned, results, part.said
-
-
-def _named(found: Any, wanted: tuple[str, ...]) -> dict[str, Floats]:
-    """Results of a fit by their names among those of the verbs."""
-    values = {f.name: getattr(found, f.name) for f in fields(found)}
-    values["mean_curvature"], values["gaussian_curvature"] = values["mean"], values["gaussian"]
-    if "mean_curvature_normal" in wanted:
-        values["mean_curvature_normal"] = -found.mean[:, None] * found.normal
-    return {name: values[name] for name in wanted}
 
 
 def _places(owned: Indices, vertices: Indices) -> Indices:
@@ -194,12 +166,9 @@ def _places(owned: Indices, vertices: Indices) -> Indices:
 
 def _arrays(mesh: FaceParts, wanted: Iterable[str], scheme: Scheme, out: Mapping[str, Any]) -> dict[str, Any]:
     """The caller's arrays, anything that takes slices, or new ones in memory."""
-    known = _OF_FITS if isinstance(scheme, Fit) else direct.PER_VERTEX
     results: dict[str, Any] = {}
-    for name in dict.fromkeys((*wanted, *out)):
-        if name not in known:
-            raise ValueError(f"wanted: expected some of {', '.join(known)}, got {name!r}")
-        full = mesh.shape + known[name]
+    for name, shape in answers.shapes(scheme, (*wanted, *out)).items():
+        full = mesh.shape + shape
         if name in out:
             results[name] = checked_target(out[name], name, full, (mesh.points, *results.values()))
         else:

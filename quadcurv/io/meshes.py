@@ -17,7 +17,16 @@ from quadcurv.io.base import FORMATS, STORES, Content, checked_values, joined, l
 from quadcurv.io.quads import quads_by_order
 from quadcurv.io.replacing import replacing
 from quadcurv.io.seams import closed_grid, warn_of_open_sides, warn_of_seam
-from quadcurv.mesh import ChunkedGrid, FaceParts, GridBlocks, Mesh, QuadGrid, QuadMesh, Recovery, StaggeredGrid
+from quadcurv.mesh import (
+    ChunkedGrid,
+    FaceParts,
+    GridBlocks,
+    Mesh,
+    QuadGrid,
+    QuadMesh,
+    Recovery,
+    StaggeredGrid,
+)
 from quadcurv.types import MeshError, warn
 
 Wrap = Sequence[bool]
@@ -112,7 +121,7 @@ def as_mesh_or_chunks(mesh: Any, quads: ArrayLike | None = None, wrap: Wrap | No
     if isinstance(mesh, FaceParts):
         raise TypeError(
             f"mesh: {mesh!r} is computed part by part, which qc.evaluate does, of fits by names as 'k1' and "
-            "'direction1', and the verbs of one of these; all else wants it in memory: QuadMesh(points, faces)"
+            "'interval', and the verbs of one of these; all else wants it in memory: QuadMesh(points, faces)"
         )
     if isinstance(mesh, str | os.PathLike) and (store := STORES.get(Path(mesh).suffix.lower())) is not None:
         _refuse(quads, None, "grid on disk")
