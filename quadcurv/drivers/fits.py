@@ -13,7 +13,6 @@ from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
-import scipy
 
 from quadcurv.boundary import (
     REACH,
@@ -27,17 +26,15 @@ from quadcurv.boundary import (
     welded,
 )
 from quadcurv.drivers.features import Features, features
+from quadcurv.drivers.rings import FaceRings, GridWindows, bundles
 from quadcurv.mesh import Mesh, QuadGrid, QuadMesh, StaggeredGrid
 from quadcurv.schemes import Curvatures, Fit, StandardErrors
 from quadcurv.stencils import Stencils
-from quadcurv.types import Bools, Floats, Indices, Ints
+from quadcurv.types import Bools, Floats, Indices
 
 _GHOST_DEGREE, _GHOST_LAYERS = 5, 3
 ROUNDING = 2.0**-49  # of positions, and of what is computed from them
 _SURE = 0.01
-_AVERAGED = 5  # rings that normals are averaged over where noise prevails
-# Of one fit, in vertices of the finite-volume scheme.
-_WORK = 30
 _CLEARLY = 3.0  # what the standard error of a one-sided fit must be of another's to be thought larger
 
 
@@ -77,17 +74,18 @@ class MeshNeighbourhoods:
         self.rounding = ROUNDING * float(np.abs(x).max(initial=0.0))
 
     def polynomials(
-        self, vertices: Indices, degree: int, rings: int, ghosts: bool = True, kind: int = 0
+        self, vertices: Indices, degree: int, rings: int, ghosts: bool = True, kind: int = 0, nested: int = 1
     ) -> Floats:
-        """(k, COLUMNS): see `Neighbourhoods`."""
+        """(k, COLUMNS) or (nested, k, COLUMNS): see `Neighbourhoods`."""
         from quadcurv.kernels import jet
 
         one_sided = kind != jet.PLAIN and bool((self.on_crease | self.on_jump).any())
         if one_sided:
-            own: _GridNeighbourhoods | _FaceNeighbourhoods = self._sides
-        else:  # windows have the normals of their rings alone
-            own = self._faces if self._windows is None or kind == jet.ROUND else self._windows
-        out = own.polynomials(vertices, degree, rings, kind)
+            own: GridWindows | FaceRings = self._sides
+        else:
+            narrow = kind == jet.ROUND and self._windows is not None and self._windows.overlap(rings)
+            own = self._faces if self._windows is None or narrow else self._windows
+        out = own.polynomials(vertices, degree, rings, kind, nested)
         for faces, place, reach, error in (*(self._beyond(rings) if ghosts else ()), *self._at_poles(rings)):
             at = np.where(self._at_crease[vertices], -1, place[vertices]) if one_sided else place[vertices]
             if error is not None:  # one-sided fits follow a smooth surface as well, but magnify noise
@@ -97,8 +95,8 @@ class MeshNeighbourhoods:
                 at = np.where(own_error <= _CLEARLY * error[at], -1, at)
                 self.border_error(rings)[vertices[at >= 0]] = error[at[at >= 0]]
             once, again = np.unique(at[at >= 0], return_inverse=True)  # all points of a pole are one vertex
-            out[at >= 0] = faces.polynomials(once, degree, reach, kind)[again]
-        return out
+            out[at >= 0] = faces.polynomials(once, degree, reach, kind, nested)[again]
+        return out if nested == 1 else out.reshape(-1, nested, jet.COLUMNS).swapaxes(0, 1)
 
     def border_error(self, rings: int) -> Floats:
         """(n,): see `Neighbourhoods`."""
@@ -123,18 +121,7 @@ class MeshNeighbourhoods:
 
     def pooled(self, values: Floats) -> Floats:
         """(n, k): see `Neighbourhoods`."""
-        known = np.isfinite(values)
-        count = self._adjacency @ known.astype(np.float64)
-        with np.errstate(divide="ignore", invalid="ignore"):
-            return self._adjacency @ np.where(known, values, 0.0) / count
-
-    @cached_property
-    def _adjacency(self) -> scipy.sparse.csr_array:
-        """(n, n): 1 between vertices of one face."""
-        incidence, n = self._faces._incidence[:, : self.stencils.n].astype(np.float64), self.stencils.n
-        near = (incidence.T @ incidence).tocsr()
-        near.data[:] = 1.0
-        return near[:n, :n]
+        return self._faces.means(values)
 
     def lattice(self, layers: int) -> Floats:
         """(r + 2 layers, c + 2 layers, 3): see `Neighbourhoods`."""
@@ -154,8 +141,8 @@ class MeshNeighbourhoods:
         return x
 
     @cached_property
-    def _faces(self) -> _FaceNeighbourhoods:
-        return _FaceNeighbourhoods(self.stencils, present=self.present)
+    def _faces(self) -> FaceRings:
+        return FaceRings(self.stencils, present=self.present)
 
     @cached_property
     def on_crease(self) -> Bools:
@@ -174,20 +161,20 @@ class MeshNeighbourhoods:
     @cached_property
     def _at_crease(self) -> Bools:
         """(n,): what ghosts would continue across a crease."""
-        near = (self.on_crease | self.on_jump).astype(np.float64)
+        near = (self.on_crease | self.on_jump).astype(np.float64)[:, None]
         for _ in range(_GHOST_LAYERS):
-            near = self._adjacency @ near
-        return near > 0
+            near = self._faces.means(near)
+        return near[:, 0] > 0
 
     @cached_property
-    def _sides(self) -> _FaceNeighbourhoods:
+    def _sides(self) -> FaceRings:
         """Rings that end at creases and jumps of curvature."""
-        return _FaceNeighbourhoods(self.stencils, present=self.present & ~(self.on_crease | self.on_jump))
+        return FaceRings(self.stencils, present=self.present & ~(self.on_crease | self.on_jump))
 
     @cached_property
-    def _windows(self) -> _GridNeighbourhoods | None:
+    def _windows(self) -> GridWindows | None:
         if isinstance(self.mesh, QuadGrid) and self.mesh.mask is None:
-            return _GridNeighbourhoods(self.mesh, self.stencils)
+            return GridWindows(self.mesh, self._faces)
         return None
 
     def _beyond(self, rings: int) -> list[_Beyond]:
@@ -221,7 +208,7 @@ class MeshNeighbourhoods:
         place = pole.copy()
         beside = np.setdiff1d(stencils.faces[near], [-1, *pole[pole >= 0]])
         place[beside] = beside
-        return [_Beyond(_FaceNeighbourhoods(stencils), place, 0)]
+        return [_Beyond(FaceRings(stencils), place, 0)]
 
     def _mirrored(self, vertices: Indices, rings: int, inside: bool = False) -> list[_Beyond]:
         """Neighbourhoods completed by points of fitted surfaces, as stencils that lead to these points."""
@@ -239,7 +226,7 @@ class MeshNeighbourhoods:
         points = mirrored(self.stencils, surfaces, rings)
         place = np.full(self.stencils.n, -1)
         place[vertices] = np.arange(vertices.size)
-        faces = _FaceNeighbourhoods(_bundles(points), surfaces.frames[:, 2])
+        faces = FaceRings(bundles(points), surfaces.frames[:, 2])
         return [_Beyond(faces, place, 1, error if inside else None)]
 
     @cached_property
@@ -251,115 +238,13 @@ class MeshNeighbourhoods:
         return {}
 
 
-class _GridNeighbourhoods:
-    """Windows of a grid."""
-
-    def __init__(self, grid: QuadGrid, stencils: Stencils) -> None:
-        self.grid, self.normals = grid, stencils.ring_areas.reshape(grid.points.shape)
-
-    def polynomials(self, vertices: Indices, degree: int, rings: int, kind: int) -> Floats:
-        from quadcurv.kernels import jet
-
-        at = np.stack(np.divmod(vertices, self.grid.shape[1]), axis=1) + rings
-        points, normals = self.grid.points, self.normals
-        for axis, wraps in enumerate(self.grid.wrap):
-            points, normals = (_padded(x, axis, wraps, rings) for x in (points, normals))
-        return _over(
-            lambda v, out: jet.grid_fits(points, normals, v, degree, rings, kind, out), at.astype(np.int32)
-        )
-
-
-class _FaceNeighbourhoods:
-    """Rings of faces.
-
-    Rings do not go on through vertices that are not `present`: beyond those of several fans, or of an edge of
-    more than two faces, lies another sheet.
-    """
-
-    def __init__(
-        self, stencils: Stencils, normals: Floats | None = None, present: Bools | None = None
-    ) -> None:
-        from quadcurv.kernels import topology
-
-        self.stencils = stencils
-        self.corners = topology.corners_by_vertex(stencils.faces, len(stencils.points))
-        if present is not None and not present.all():
-            indptr, corners = self.corners
-            size = np.diff(indptr)
-            seen = np.append(present, np.ones(size.size - present.size, bool))
-            starts = np.cumsum(np.where(seen, size, 0))
-            self.corners = np.concatenate(([0], starts)), corners[np.repeat(seen, size)]
-        self.normals = self._ring_normals() if normals is None else normals
-
-    def _ring_normals(self) -> Floats:
-        """(n, 3): normals of the rings; where the polygon around a vertex has no area its neighbours'."""
-        stencils, (indptr, corners) = self.stencils, self.corners
-        normals = stencils.ring_areas
-        flat = np.flatnonzero((np.diff(indptr)[: stencils.n] > 0) & ~normals.any(axis=1))
-        normals = normals.copy() if flat.size else normals
-        for v in flat:  # of valence 2
-            around = stencils.faces[corners[indptr[v] : indptr[v + 1]] // 4]
-            around = around[(around >= 0) & (around < stencils.n)]
-            normals[v] = stencils.ring_areas[np.unique(around)].sum(axis=0)
-        return normals
-
-    def polynomials(self, vertices: Indices, degree: int, rings: int, kind: int) -> Floats:
-        from quadcurv.kernels import jet
-
-        s, (indptr, corners) = self.stencils, self.corners
-        normals = self._averaged if kind == jet.ROUND else self.normals
-
-        def fits(vertices: Ints, out: Floats) -> None:
-            jet.face_fits(
-                s.points, s.faces, indptr, corners, normals, s.orientable, vertices, degree, rings, kind, out
-            )
-
-        return _over(fits, vertices.astype(np.int32))
-
-    @cached_property
-    def _averaged(self) -> Floats:
-        """(n, 3): normals over more rings, of which noise leaves little."""
-        incidence = self._incidence[:, : len(self.normals)].astype(np.float64)
-        normals = self.normals
-        for _ in range(_AVERAGED):
-            normals = incidence.T @ (incidence @ normals)
-        return normals
-
-    @cached_property
-    def _incidence(self) -> scipy.sparse.csr_array:
-        """(faces, points) bool."""
-        faces, sides = self.stencils.faces, self.stencils.faces >= 0
-        indptr = np.concatenate(([0], np.cumsum(sides.sum(axis=1))))
-        shape = len(faces), len(self.stencils.points)
-        return scipy.sparse.csr_array((np.ones(indptr[-1], bool), faces[sides], indptr), shape)
-
-    def positions(self, vertices: Indices, rings: int) -> Floats:
-        incidence, k = self._incidence, vertices.size
-        around = scipy.sparse.csr_array(
-            (np.ones(k, bool), vertices, np.arange(k + 1)), (k, len(self.stencils.points))
-        )
-        for _ in range(rings):
-            around = around + around @ incidence.T @ incidence
-        around.sort_indices()
-        row, column = around.nonzero()
-        other = column != vertices[row]
-        row, column = row[other], column[other]
-        size = np.bincount(row, minlength=k)
-        out = np.full((k, 1 + size.max(initial=0), 3), np.nan)
-        out[:, 0] = self.stencils.points[vertices]
-        out[row, 1 + np.arange(row.size) - np.repeat(np.cumsum(size) - size, size)] = self.stencils.points[
-            column
-        ]
-        return out
-
-
 class _Beyond(NamedTuple):
     """Neighbourhoods of `reach` rings that go on beyond the border, and the places of vertices in them.
 
     Where there is an `error`, of H by these, they are taken if that of the one-sided fit is clearly larger.
     """
 
-    faces: _FaceNeighbourhoods
+    faces: FaceRings
     place: Indices
     reach: int
     error: Floats | None = None
@@ -394,7 +279,7 @@ def _continued(stencils: Stencils, layers: int) -> list[_Beyond]:
     chosen = np.flatnonzero((near & ~bad)[: part.n])
     place = np.full(stencils.n, -1)
     place[kept[chosen]] = chosen
-    return [_Beyond(_FaceNeighbourhoods(ghosted), place, layers)]
+    return [_Beyond(FaceRings(ghosted), place, layers)]
 
 
 def _with_neighbours(stencils: Stencils, chosen: Bools) -> Bools:
@@ -403,18 +288,6 @@ def _with_neighbours(stencils: Stencils, chosen: Bools) -> Bools:
     near = np.pad(chosen, (0, len(stencils.points) - stencils.n))
     near[corners[near[corners].any(axis=1)]] = True
     return near[: stencils.n]
-
-
-def _bundles(points: Floats) -> Stencils:
-    """Faces that lead from the first of each (k, m, 3) points to its others, and nowhere else."""
-    k, m, _ = points.shape
-    index = np.where(np.isnan(points[:, 1:, 0]), -1, np.arange(k * (m - 1)).reshape(k, m - 1) + k)
-    index = np.pad(index, [(0, 0), (0, -(m - 1) % 3)], constant_values=-1).reshape(k, -1, 3)
-    faces = np.concatenate(
-        (np.broadcast_to(np.arange(k)[:, None, None], (*index.shape[:2], 1)), index), axis=2
-    )
-    flat = np.concatenate((points[:, 0], np.nan_to_num(points[:, 1:]).reshape(-1, 3)))
-    return Stencils(flat, faces.reshape(-1, 4).astype(np.int32), (k,), np.ones(k, bool))
 
 
 def _stencils(mesh: Mesh) -> tuple[Stencils, Bools]:
@@ -446,20 +319,6 @@ def _replaced(positions: Floats, kept: Bools, others: Floats) -> Floats:
     out = np.full((len(positions), m, 3), np.nan)
     out[~kept, : positions.shape[1]] = positions[~kept]
     out[kept, : others.shape[1]] = others
-    return out
-
-
-def _over(fits: Callable[[Any, Floats], None], vertices: Ints) -> Floats:
-    """Run a kernel over vertices, in ranges by several threads where there are many."""
-    from quadcurv.kernels import jet, ranges
-
-    out = np.empty((len(vertices), jet.COLUMNS))
-    ranges.over(
-        lambda start, stop: fits(vertices[start:stop], out[start:stop]),
-        len(vertices),
-        _WORK * len(vertices),
-        jet.LANES,
-    )
     return out
 
 

@@ -20,7 +20,9 @@ from numba import types
 from numba.core import cgutils
 from numba.extending import intrinsic
 
+WIDTH = 8  # numbers that stand side by side in `Lanes`
 _DOUBLE, _INT, _BOOL = ir.DoubleType(), ir.IntType(64), ir.IntType(1)
+_LANES, _FLAGS = ir.VectorType(_DOUBLE, WIDTH), ir.VectorType(_BOOL, WIDTH)
 _fresh = count()
 
 
@@ -91,7 +93,7 @@ def _operator(instruction, swapped=False):
             return NotImplemented
         a, b = (b, a) if swapped else (a, b)
         draft = _desk.drafts[-1]
-        flags = {"flags": ("contract",)} if draft.contract and self.kind is _DOUBLE else {}
+        flags = {"flags": ("contract",)} if draft.contract and self.kind in (_DOUBLE, _LANES) else {}
         return type(self)(getattr(draft.builder, instruction)(a, b, **flags))
 
     return operate
@@ -99,7 +101,8 @@ def _operator(instruction, swapped=False):
 
 def _comparison(instruction, sign):
     def compare(self, other):
-        return Truth(getattr(_desk.drafts[-1].builder, instruction)(sign, self.value, self.of(other)))
+        value = getattr(_desk.drafts[-1].builder, instruction)(sign, self.value, self.of(other))
+        return (Flags if self.kind is _LANES else Truth)(value)
 
     return compare
 
@@ -136,6 +139,40 @@ class Truth(_Value):
     """A bool."""
 
     kind, number, numbers = _BOOL, int, (bool,)
+    __and__, __or__ = _operator("and_"), _operator("or_")
+
+
+class Lanes(Real):
+    """WIDTH float64 side by side; a single one stands for as many that are equal."""
+
+    kind = _LANES
+
+    # Named again: only so does Python ask the right one of two operands first.
+    __add__, __sub__, __mul__, __truediv__ = map(_operator, ("fadd", "fsub", "fmul", "fdiv"))
+    __radd__, __rsub__ = _operator("fadd", swapped=True), _operator("fsub", swapped=True)
+    __rmul__, __rtruediv__ = _operator("fmul", swapped=True), _operator("fdiv", swapped=True)
+
+    def __neg__(self):
+        return Lanes(_desk.drafts[-1].builder.fneg(self.value))
+
+    @classmethod
+    def of(cls, x):
+        """The same for numbers, of which there are many then."""
+        if isinstance(x, cls):
+            return x.value
+        if isinstance(x, Real):
+            builder, undefined = _desk.drafts[-1].builder, ir.Constant(_LANES, ir.Undefined)
+            first = builder.insert_element(undefined, x.value, ir.IntType(32)(0))
+            return builder.shuffle_vector(
+                first, undefined, ir.Constant(ir.VectorType(ir.IntType(32), WIDTH), [0] * WIDTH)
+            )
+        return ir.Constant(_LANES, [float(x)] * WIDTH) if isinstance(x, cls.numbers) else None
+
+
+class Flags(Truth):
+    """WIDTH bools side by side."""
+
+    kind = _FLAGS
     __and__, __or__ = _operator("and_"), _operator("or_")
 
 
@@ -262,14 +299,16 @@ def _packed(context, builder, t, result):
 def where(condition, a, b):
     """A where a condition holds, else b: numbers, or arrays."""
     if not isinstance(condition, Truth):
-        return a if condition else b
+        return np.where(condition, a, b) if isinstance(condition, np.ndarray) else a if condition else b
     builder = _desk.drafts[-1].builder
     if isinstance(a, Memory):
         data, size = builder.select(condition.value, a.data, b.data), where(condition, a.size, b.size)
         return Memory(data, size, a.dtype, a.owners | b.owners)
-    kind = next((kind for kind in (Truth, Real) if isinstance(a, kind) or isinstance(b, kind)), Whole)
-    if isinstance(a, float) or isinstance(b, float):
+    kind = next((k for k in (Lanes, Flags, Truth, Real) if isinstance(a, k) or isinstance(b, k)), Whole)
+    if kind is Whole and (isinstance(a, float) or isinstance(b, float)):
         kind = Real
+    if isinstance(condition, Flags) and kind is not Flags:
+        kind = Lanes
     return kind(builder.select(condition.value, kind.of(a), kind.of(b)))
 
 
@@ -311,7 +350,9 @@ class Carried:
     def __init__(self, values):
         self._values = values
         if _desk.drafts:
-            self._kinds = [next(kind for kind in (Whole, Real) if kind.of(x) is not None) for x in values]
+            self._kinds = [
+                Lanes if isinstance(x, Lanes) else Real if Whole.of(x) is None else Whole for x in values
+            ]
             self._places = [
                 cgutils.alloca_once_value(_desk.drafts[-1].builder, kind.of(x))
                 for kind, x in zip(self._kinds, values, strict=True)
@@ -340,6 +381,13 @@ def _called(name, returned, arguments):
     return builder.call(cgutils.get_or_insert_function(builder.module, kind, name), arguments)
 
 
+def _of_reals(name, *given):
+    """A call of one that takes and returns reals, side by side if any of them are."""
+    kind = Lanes if any(isinstance(x, Lanes) for x in given) else Real
+    name = f"llvm.{name}.{'v8f64' if kind is Lanes else 'f64'}"
+    return kind(_called(name, kind.kind, [kind.of(x) for x in given]))
+
+
 def muladd(a, b, c):
     """Product of a and b, plus c, rounded once where the processor can.
 
@@ -347,12 +395,59 @@ def muladd(a, b, c):
     """
     if not any(isinstance(x, Real) for x in (a, b, c)):
         return a * b + c
-    return Real(_called("llvm.fmuladd.f64", _DOUBLE, [Real.of(x) for x in (a, b, c)]))
+    return _of_reals("fmuladd", a, b, c)
 
 
 def root(x):
     """Square root."""
-    return Real(_called("llvm.sqrt.f64", _DOUBLE, [x.value])) if isinstance(x, Real) else np.sqrt(x)
+    return _of_reals("sqrt", x) if isinstance(x, Real) else np.sqrt(x)
+
+
+def lanes(values, index):
+    """The WIDTH entries of an array of float64 from an index on."""
+    if not isinstance(values, Memory):
+        return values[index : index + WIDTH].copy()
+    draft = _desk.drafts[-1]
+    address = draft.builder.bitcast(values.address(index), _LANES.as_pointer())
+    return Lanes(draft.marked(draft.builder.load(address, align=8), values.owners))
+
+
+def put_lanes(values, index, x):
+    """Write them."""
+    if not isinstance(values, Memory):
+        values[index : index + WIDTH] = x
+        return
+    draft = _desk.drafts[-1]
+    address = draft.builder.bitcast(values.address(index), _LANES.as_pointer())
+    draft.marked(draft.builder.store(Lanes.of(x), address, align=8), values.owners)
+
+
+def side_by_side(numbers):
+    """WIDTH numbers as lanes."""
+    if not isinstance(numbers[0], Real):
+        return np.array(numbers)
+    builder, value = _desk.drafts[-1].builder, ir.Constant(_LANES, ir.Undefined)
+    for k, x in enumerate(numbers):
+        value = builder.insert_element(value, x.value, ir.IntType(32)(k))
+    return Lanes(value)
+
+
+def three_lanes(values, index):
+    """WIDTH triples that follow each other, as lanes of their first, second and third numbers."""
+    if not isinstance(values, Memory):
+        return tuple(values[index : index + 3 * WIDTH].reshape(WIDTH, 3).T.copy())
+    draft, found = _desk.drafts[-1], []
+    one, two, three = (lanes(values, index + k * WIDTH).value for k in range(3))
+
+    def shuffled(a, b, places):
+        return draft.builder.shuffle_vector(a, b, ir.Constant(ir.VectorType(ir.IntType(32), WIDTH), places))
+
+    for k in range(3):
+        places = range(k, 3 * WIDTH, 3)
+        near, far = [at for at in places if at < 2 * WIDTH], [at for at in places if at >= 2 * WIDTH]
+        both = shuffled(one, two, near + [0] * len(far))
+        found.append(Lanes(shuffled(both, three, [*range(len(near)), *(at - WIDTH for at in far)])))
+    return tuple(found)
 
 
 def real(x):

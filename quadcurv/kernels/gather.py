@@ -1,142 +1,124 @@
-"""Neighbourhoods of vertices, gathered for fits that go side by side.
+"""What lies around vertices, as indices: for fits that go side by side, WIDTH of them a block.
 
-LANES of them make a block; a row of a block is what one point of every neighbourhood has, four times LANES
-numbers: x, y, z less those of the vertex itself, and the weight.
-
-A round neighbourhood is fitted over the sphere through its vertex, tangent to the plane there, that is
-nearest to it: an inversion about the opposite point, which leaves angles and the vertex as they are, makes
-the sphere that plane, and takes its curvature from all normal curvatures at the vertex. With d the position
-less the vertex, n the normal and b the sphere's curvature, what is inverted has
-
-    (x, y) / D,   (z + b d^2 / 2) / D,   D = 1 + b z + b^2 d^2 / 4 = (n + b d / 2)^2.
-
-What is left to be followed by a polynomial is how the surface departs from a sphere: nothing of a coarse
-one is steep, and the terms of higher degree are smaller wherever the principal curvatures are of one sign.
+A row of a block is one point of each of its neighbourhoods. Neighbourhoods of different size end with the
+vertex itself, over and over, up to the size of the largest: `counts` tells how many points there are.
 """
 
-from functools import partial
+import numpy as np
 
-from quadcurv.kernels.compiled import helper, kernel
-from quadcurv.kernels.formulas import Carried, formula, root, span, where
-from quadcurv.kernels.vector import cross, less, triple
+from quadcurv.kernels.compiled import flat, helper, kernel
+from quadcurv.kernels.formulas import WIDTH, Carried, formula, span, where
 
-LANES = 48
-ROWS = 4  # of LANES numbers
-BLOCKS = 8  # gathered at once
-FARTHEST = 0.1  # of D: beyond, near the opposite point of the sphere, nothing is looked at
 CROWDED = 64  # faces of a vertex, of which others are passed over from twice as many on
-# Steepest that a neighbourhood of more than one ring may be. A polynomial follows no steeper one (a sphere is
-# vertical where its powers stop converging), and what folds over is no graph at all.
-SLOPE = 2.0
-
-# Nothing but fused multiply-adds is left to the compiler: NaN stays NaN.
-step = partial(formula, contract=True)
+ROOM = 6000  # points of all blocks that are gathered at once
 
 
-def is_steep(up, a, n):
-    """Whether a normal, of any length, is further than SLOPE from another one, n, of unit length."""
-    share = (1.0 + SLOPE * SLOPE) * up * where(up < 0, -up, up)
-    return share < a[0] * a[0] + a[1] * a[1] + a[2] * a[2]
+class Blocks:
+    """Room for the neighbourhoods of many blocks, and what is in it.
+
+    Attributes
+    ----------
+    centres : (WIDTH b,) int32
+        The vertices; the last one again where there are fewer.
+    counts : (WIDTH b,) int32
+        Points of each neighbourhood.
+    index : (b room WIDTH,) int32
+        Block by block, row by row.
+    beside : (b,) bool
+        Whether the indices of every row of a block follow each other: then the first of them will do.
+    room : int
+        Rows of a block.
+    """
+
+    def __init__(self, room):
+        self.room, self.most = room, max(4, ROOM // room)
+        self.centres, self.counts = np.zeros((2, WIDTH * self.most), np.int32)
+        self.index, self.beside = np.zeros(WIDTH * self.most * room, np.int32), np.zeros(self.most, bool)
+        self.size = 0
+
+    def begin(self, vertices):
+        """Take other vertices, WIDTH a block."""
+        self.size = -(-len(vertices) // WIDTH)
+        self.centres[: len(vertices)] = vertices
+        self.centres[len(vertices) : WIDTH * self.size] = vertices[-1]
 
 
-@step()
-def turned(normals, v, P, m, axes, block, lane):
-    """Whether the normal of a vertex, row m of a neighbourhood, is too steep over the sphere; not if NaN."""
-    i = 4 * block * LANES + lane
-    a, n, bend, d = triple(normals, 3 * v, 1), triple(axes, i, LANES), axes[i + 3 * LANES], column(P, m, lane)
-    # Mirrored by the inversion at n + b d / 2, of square D, and turned over.
-    half = n[0] + bend * d[0] / 2, n[1] + bend * d[1] / 2, n[2] + bend * d[2] / 2
-    up = 2.0 * inner(half, n) * inner(half, a) / inner(half, half) - inner(a, n)
-    return is_steep(up, a, n)
+@formula
+def window_beside(c, rings, columns, at, index):
+    """The window of a vertex far from all sides, in the first column of a block."""
+    for p in span(0, 2 * rings + 1):
+        for q in span(0, 2 * rings + 1):
+            index[at + (p * (2 * rings + 1) + q) * WIDTH] = c + (p - rings) * columns + q - rings
 
 
-def inner(a, b):
-    """Inner product."""
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+@formula
+def clipped_window(row_of, column_of, columns, i, j, rings, at, index):
+    """The window of a vertex as far as the grid goes; how many points it has."""
+    size = Carried((0 * i,))
+    for p in span(i, i + 2 * rings + 1):
+        for q in span(j, j + 2 * rings + 1):
+            (m,), row, column = size.get(), row_of[p], column_of[q]
+            index[at + m * WIDTH] = row * columns + column
+            size.set((m + where((row >= 0) & (column >= 0), 1, 0),))
+    return size.get()[0]
 
 
-@step()
-def add_point(points, v, c, P, m, lane):
-    """Put a point less a centre, or nothing where it is NaN, into row m of a neighbourhood."""
-    x, y, z = less(triple(points, 3 * v, 1), triple(points, 3 * c, 1))
-    known = x == x
-    for k, value in enumerate((x, y, z, 1.0)):
-        P[(ROWS * m + k) * LANES + lane] = where(known, value, 0.0)
-
-
-@step()
-def no_point(P, m, lane):
-    """Put nothing into row m of a neighbourhood."""
-    for k in range(4):
-        P[(ROWS * m + k) * LANES + lane] = 0.0
-
-
-def column(P, m, lane):
-    """Row m of a neighbourhood."""
-    return triple(P, ROWS * m * LANES + lane, LANES)
-
-
-@step()
-def window_normal(P, middle, width, axes, block, lane):
-    """The normal across the ring of edge neighbours, of unit length; missing ones are at the centre."""
-    a = less(column(P, middle + width, lane), column(P, middle - width, lane))
-    b = less(column(P, middle + 1, lane), column(P, middle - 1, lane))
-    put_axis(cross(a, b), axes, block, lane)
-
-
-@step()
-def vertex_normal(normals, c, axes, block, lane):
-    """The normal as given, of unit length."""
-    put_axis(triple(normals, 3 * c, 1), axes, block, lane)
-
-
-def put_axis(n, axes, block, lane):
-    """A normal made one of unit length, and no sphere yet."""
-    length = root(inner(n, n))
-    for k, x in enumerate((*(x / length for x in n), 0.0)):
-        axes[(4 * block + k) * LANES + lane] = x
-
-
-@step()
-def nearest_sphere(P, first, last, axes, block, lane):
-    """Curvature of the sphere that is nearest to a neighbourhood: z + b d^2 / 2 = 0 by least squares."""
-    i = 4 * block * LANES + lane
-    n, sums = triple(axes, i, LANES), Carried((0.0, 0.0))
-    for m in span(first, last):
-        d = column(P, m, lane)
-        square, (above, fourth) = inner(d, d), sums.get()
-        sums.set((above + inner(d, n) * square, fourth + square * square))
-    above, fourth = sums.get()
-    axes[i + 3 * LANES] = where(fourth > 0, -2.0 * above / fourth, 0.0)
+@formula
+def fill(index, at, begin, end, v):
+    """Put a vertex into further rows."""
+    for m in span(begin, end):
+        index[at + m * WIDTH] = v
 
 
 @kernel
-def windows(points, normals, columns, vertices, rings, is_round, P, counts, axes, steep):
-    """Gather windows of a grid, with their normals and spheres; which are too steep."""
-    width, total = 2 * rings + 1, vertices.size // 2
-    for k in range(counts.size * LANES):
-        block, lane, at = k // LANES, k % LANES, min(k, total - 1)
-        first, middle = block * width * width, block * width * width + (width * width - 1) // 2
-        c = vertices[2 * at] * columns + vertices[2 * at + 1]
-        counts[block] = width * width
-        for m in range(width * width):
-            v = c + (m // width - rings) * columns + m % width - rings
-            add_point(points, v, c, P, first + m, lane)
-        window_normal(P, middle, width, axes, block, lane)
-        if is_round:
-            nearest_sphere(P, first, first + width * width, axes, block, lane)
-        found = False
-        if rings > 1:
-            for m in range(width * width):
-                v = c + (m // width - rings) * columns + m % width - rings
-                found |= turned(normals, v, P, first + m, axes, block, lane)
-        steep[k] = found
+def _windows(row_of, column_of, rings, centres, blocks, index, counts, beside):
+    rows, columns = row_of.size - 2 * rings, column_of.size - 2 * rings
+    room = (2 * rings + 1) * (2 * rings + 1)
+    for block in range(blocks):
+        c, at = centres[block * WIDTH], block * room * WIDTH
+        i, j = c // columns, c % columns
+        following = rings <= i < rows - rings and rings <= j < columns - rings - WIDTH + 1
+        for k in range(block * WIDTH, (block + 1) * WIDTH):
+            following = following and centres[k] == c + k - block * WIDTH
+        beside[block] = following
+        if following:
+            window_beside(c, rings, columns, at, index)
+        for k in range(block * WIDTH, (block + 1) * WIDTH):
+            counts[k] = room
+            if not following:
+                c = centres[k]
+                m = clipped_window(row_of, column_of, columns, c // columns, c % columns, rings, at, index)
+                fill(index, at, m, room, c)
+                counts[k] = m
+            at += 1
+
+
+def windows(shape, wrap, rings, blocks):
+    """Put windows of 2 rings + 1 points in both directions into blocks, as far as the grid goes."""
+    places = []
+    for size, wraps in zip(shape, wrap, strict=True):
+        at = np.arange(-rings, size + rings)
+        places.append(flat(at % size if wraps else np.where((at >= 0) & (at < size), at, -1), np.int32))
+    _windows(*places, rings, blocks.centres, blocks.size, blocks.index, blocks.counts, blocks.beside)
+
+
+@formula
+def corners_of(faces, f, mark, stamp, around, end):
+    """Write those corners of a face that are new behind what is there; where that ends then."""
+    for s in range(4):
+        v = faces[4 * f + s]
+        at = where(v < 0, stamp.size - 1, v)
+        is_new = (v >= 0) & (stamp[at] != mark)
+        around[end] = v
+        stamp[at] = where(is_new, mark, stamp[at])
+        end = end + where(is_new, 1, 0)
+    return end
 
 
 @helper
-def neighbourhood(faces, indptr, corners, c, rings, stamp, around):
+def neighbourhood(faces, indptr, corners, c, rings, mark, stamp, around):
     """Write c and the vertices of `rings` rings of faces around it to `around`; how many they are."""
-    stamp[c] = c
+    stamp[c] = mark
     around[0] = c
     begin, end = 0, 1
     for _ in range(rings):
@@ -146,45 +128,138 @@ def neighbourhood(faces, indptr, corners, c, rings, stamp, around):
             # Of a vertex of very many faces, a pole, some stand for all: else its neighbours' fits would each
             # look at all of them.
             for k in range(indptr[v], indptr[v + 1], max(1, (indptr[v + 1] - indptr[v]) // CROWDED)):
-                f = corners[k] >> 2
-                for s in range(4):
-                    x = faces[4 * f + s]
-                    if x >= 0 and stamp[x] != c:
-                        stamp[x] = c
-                        around[new] = x
-                        new += 1
+                new = corners_of(faces, corners[k] >> 2, mark, stamp, around, new)
         begin, end = end, new
     return end
 
 
+def step_to(ring, v, turn, direction):
+    """The neighbour of a vertex in a direction, how far its ring is turned, and whether it is regular."""
+    x = ring[8 * v + ((direction + turn) & 7)]
+    back, found = 0, False
+    for k in (0, 2, 4, 6):
+        here = ring[8 * x + k] == v
+        back, found = where(here, k, back), here | found
+    return x, (back - direction - 4) & 7, found & (ring[8 * x] >= 0)
+
+
+def half_row(ring, v, turn, direction, rings, at, step, around):
+    """Write three rows of a window, from v on in a direction; whether vertices on the way are regular."""
+    up = 1 if direction == 0 else 3
+    state = Carried((v, turn, at, 1 + 0 * v))
+    for _ in span(0, rings - 1):
+        v, turn, at, known = state.get()
+        for i, k in ((0, None), (1, 2), (-1, 6)):
+            around[at + i] = v if k is None else ring[8 * v + ((k + turn) & 7)]
+        x, turned, is_regular = step_to(ring, v, turn, direction)
+        on = is_regular & (known > 0)
+        state.set((where(on, x, v), where(on, turned, turn), at + step, where(on, 1, 0)))
+    v, turn, at, known = state.get()
+    for i, k in ((0, None), (1, 2), (-1, 6)):
+        around[at + i] = v if k is None else ring[8 * v + ((k + turn) & 7)]
+    for i, k in ((0, direction), (1, up), (-1, 8 - up)):
+        around[at + step + i] = ring[8 * v + ((k + turn) & 7)]
+    return known > 0
+
+
+@formula
+def window(ring, c, rings, mark, stamp, around):
+    """Write the neighbourhood of a regular vertex if it is a window: regular inside, no vertex there twice.
+
+    Along every third of its rows, by the rings of the vertices there.
+    """
+    width = 2 * rings + 1
+    middle = rings * width + rings
+    known = 1 + 0 * c
+    for across, side in ((2, 1), (6, -1)):
+        state = Carried((c, 0 * c, 0 * c, known))
+        for j in span(0, rings):
+            v, turn, since, known = state.get()
+            is_row = (since == 0) | (j == rings - 1)
+            rows = where(is_row, 1, 0)
+            for along, step in ((0, width), (4, -1 * width)):
+                right = Carried((known,))
+                for _ in span(0, rows):
+                    (before,) = right.get()
+                    found = half_row(ring, v, turn, along, rings, middle + side * j, step, around)
+                    right.set((where(found, before, 0),))
+                (known,) = right.get()
+            x, turned, is_regular = step_to(ring, v, turn, across)
+            on = is_regular & (known > 0)
+            last = j == rings - 1
+            known = where(on | last, known, 0)
+            state.set((where(on, x, v), where(on, turned, turn), where(since == 2, 0, since + 1), known))
+        known = state.get()[3]
+    fine = Carried((known,))
+    for i in span(0, where(known > 0, width, 0)):
+        for j in span(0, width):
+            v, (known,) = around[i * width + j], fine.get()
+            at_rim = (i == 0) | (i == width - 1) | (j == 0) | (j == width - 1)
+            fine.set((where((stamp[v] != mark) & (at_rim | (ring[8 * v] >= 0)), known, 0),))
+            stamp[v] = mark
+    return fine.get()[0] > 0
+
+
+@formula
+def put(around, size, room, c, at, lane, before, index):
+    """Write a neighbourhood into a column of a block; whether its entries follow those of the first one."""
+    following = Carried((where(before, 1, 0),))
+    for m in span(0, size):
+        v, (known,) = around[m], following.get()
+        following.set((where(v == index[at + m * WIDTH] + lane, known, 0),))
+        index[at + m * WIDTH + lane] = v
+    for m in span(size, room):
+        index[at + m * WIDTH + lane] = c
+    return following.get()[0] > 0
+
+
 @kernel
-def neighbourhoods(
-    points, faces, indptr, corners, normals, sided, vertices, rings, is_round, P, counts, axes, stamp, around
+def _neighbourhoods(
+    faces, indptr, corners, ring, rings, centres, blocks, room, index, counts, beside, stamp, around
 ):
-    """Gather neighbourhoods of a face list; as many rows as one needs, if there is no room for these."""
-    room = P.size // (ROWS * LANES * BLOCKS)
-    for k in range(counts.size * LANES):
-        block, lane, first = k // LANES, k % LANES, k // LANES * room
-        c, m, steep = vertices[min(k, vertices.size - 1)], 0, False
-        if k < vertices.size:
-            m = neighbourhood(faces, indptr, corners, c, rings, stamp, around)
-        if m > room:
-            return m
-        for i in range(m):
-            add_point(points, around[i], c, P, first + i, lane)
-        vertex_normal(normals, c, axes, block, lane)
-        if is_round:
-            nearest_sphere(P, first, first + m, axes, block, lane)
-        if sided and rings > 1:
-            for i in range(1, m):
-                if 3 * around[i] < normals.size:
-                    steep |= turned(normals, around[i], P, first + i, axes, block, lane)
-        m = 0 if steep else m
-        count = 0 if lane == 0 else counts[block]
-        for i in range(count, m):
-            for other in range(lane):  # whose neighbourhoods end before
-                no_point(P, first + i, other)
-        for i in range(m, count):
-            no_point(P, first + i, lane)
-        counts[block] = max(count, m)
+    mark = stamp[stamp.size - 2]  # of the last neighbourhood
+    following = False
+    for k in range(WIDTH * blocks):
+        lane, c = k & 7, centres[k]
+        mark += 2
+        m, is_window = (2 * rings + 1) * (2 * rings + 1), False
+        if ring.size > 0 and ring[8 * c] >= 0:
+            is_window = window(ring, c, rings, mark, stamp, around)
+        if not is_window:
+            m = neighbourhood(faces, indptr, corners, c, rings, mark + 1, stamp, around)
+            if m > room:
+                stamp[stamp.size - 2] = mark
+                return m
+        following = (following or lane == 0) and is_window and c == centres[k - lane] + lane
+        following = put(around, m, room, c, (k >> 3) * room * WIDTH, lane, following, index)
+        beside[k >> 3] = following
+        counts[k] = m
+    stamp[stamp.size - 2] = mark
     return room
+
+
+class Rings:
+    """Neighbourhoods of a face list by rings of faces, for one thread.
+
+    Parameters
+    ----------
+    faces : (m, 4) int32
+    indptr, corners
+        Corners by vertex, see topology.corners_by_vertex.
+    ring : (n, 8) or (0, 8) int32
+        See topology.rings. Neighbourhoods that are windows of a grid are found by it.
+    rings : int
+    """
+
+    def __init__(self, faces, indptr, corners, ring, rings):
+        self._given = flat(faces), flat(indptr), flat(corners), flat(ring), rings
+        # Which neighbourhood a vertex was last in; behind the vertices, the number of the last one.
+        self._stamp = np.zeros(indptr.size + 1, np.int32)
+        self._around = np.empty(max(indptr.size + 4, (2 * rings + 1) ** 2), np.int32)
+
+    def put(self, blocks):
+        """Put those of the centres into blocks; how much room one needs for which there is none."""
+        return _neighbourhoods(
+            *self._given, blocks.centres, blocks.size, blocks.room, blocks.index, blocks.counts,
+            blocks.beside, self._stamp, self._around,
+        )  # fmt: skip

@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from quadcurv.kernels import ranges
 from quadcurv.kernels.compiled import flat, kernel
 
 FACES = 16  # of a vertex, of which others are passed over: as many lie around a pole as anybody wants to see
@@ -58,3 +59,24 @@ def rings_around(faces, indptr, corners, vertices, rings, room):
         ring.reshape(-1),
     )
     return around, ring
+
+
+@kernel
+def _means(indptr, indices, values, columns, out, start, stop):
+    for v in range(start, stop):
+        for column in range(columns):
+            total, count = 0.0, 0
+            for k in range(indptr[v], indptr[v + 1]):
+                x = values[indices[k] * columns + column]
+                if x - x == 0:
+                    total += x
+                    count += 1
+            out[v * columns + column] = total / count
+
+
+def means(indptr, indices, values):
+    """Means of finite values (n, k) over neighbours in CSR form, NaN where there is none."""
+    n, columns = values.shape
+    given, out = (flat(indptr), flat(indices), flat(values), columns), np.empty(n * columns)
+    ranges.over(lambda start, stop: _means(*given, out, start, stop), n, n)
+    return out.reshape(n, columns)

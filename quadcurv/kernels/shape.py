@@ -27,37 +27,40 @@ def curvatures(B, constant, xx, yx, yy, bend, frame, S):
     c10 = (right[0] - B[1, 0] * c01 - B[2, 0] * c20 - B[3, 0] * c11 - B[4, 0] * c02) * B[0, 0]
 
     # d/dx = al d/dx' + be d/dy', d/dy = ga d/dy'.
-    al, be, ga = 1 / xx, -yx / (xx * yy), 1 / yy
+    al, ga = 1 / xx, 1 / yy
+    shear, stretch = -yx * ga, xx * ga
+    be = al * shear
     p, q = al * c10 + be * c01, ga * c01
     zxx = 2 * (al * al * c20 + al * be * c11 + be * be * c02)
     zxy = ga * (al * c11 + 2 * be * c02)
     zyy = 2 * ga * ga * c02
 
     # Shape operator ((a, b), (b, c)) in the basis e1 = (1, 0, p) / e, e2 = (-p q, e^2, q) / (e W), and the
-    # sphere's.
-    e2 = 1 + p * p
-    e, W = root(e2), root(e2 + q * q)
-    a = bend / W - zxx / (e2 * W)
-    b = -(e2 * zxy - p * q * zxx) / (e2 * W * W)
-    c = bend / W - (p * p * q * q * zxx - 2 * p * q * e2 * zxy + e2 * e2 * zyy) / (e2 * W * W * W)
+    # sphere's. Quotients take long: all are products with four reciprocals, i those of e^2 and j those of W.
+    e2, pq = 1 + p * p, p * q
+    i, j = 1 / e2, 1 / root(e2 + q * q)
+    along = i * zxx
+    a = (bend - along) * j
+    b = (pq * along - zxy) * j * j
+    c = (bend - (pq * pq * along - 2 * pq * zxy + e2 * zyy) * j * j) * j
     half, H = (a - c) / 2, (a + c) / 2
     size = root(half * half + b * b)
     # Half the angle of (half, b), the larger of cosine and sine first.
-    larger = root((1 + where(half < 0, -half, half) / size) / 2)
-    smaller = b / (2 * size * larger)
+    inverse = 0.5 / size
+    larger = root(0.5 + where(half < 0, -half, half) * inverse)
+    smaller = b * inverse / larger
     cos, sin = where(half < 0, smaller, larger), where(half < 0, larger, smaller)
     cos, sin = where(size == 0, 1.0, cos), where(size == 0, 0.0, sin)
-    first, second, normal = [], [], []
+    first, second, normal, over_e = [], [], [], root(i)
     for t1, t2, n in zip(frame[:3], frame[3:6], frame[6:], strict=True):
-        f1 = (t1 + p * n) / e
-        f2 = (-p * q * t1 + e2 * t2 + q * n) / (e * W)
+        f1 = (t1 + p * n) * over_e
+        f2 = (-pq * t1 + e2 * t2 + q * n) * (over_e * j)
         first.append(cos * f1 + sin * f2)
         second.append(cos * f2 - sin * f1)
-        normal.append((n - p * t1 - q * t2) / W)
+        normal.append((n - p * t1 - q * t2) * j)
 
     # Standard errors to first order; those of the slopes are of a higher one. The squares are of numbers
     # without al^2: with it, those of the smallest meshes overflow, and those of the largest ones vanish.
-    shear, stretch = -yx / yy, xx / yy
     errors = []
     for da, db, dc in (
         (0.5, 0.0, 0.5),
@@ -65,9 +68,9 @@ def curvatures(B, constant, xx, yx, yy, bend, frame, S):
         (cos * cos, 2 * cos * sin, sin * sin),
         (sin * sin, -2 * cos * sin, cos * cos),
     ):
-        dxx = -da / (e2 * W) + db * p * q / (e2 * W * W) - dc * p * p * q * q / (e2 * W * W * W)
-        dxy = -db / (W * W) + dc * 2 * p * q / (W * W * W)
-        dyy = -dc * e2 / (W * W * W)
+        dxx = (-da + (db - dc * pq * j) * pq * j) * i * j
+        dxy = (2 * dc * pq * j - db) * j * j
+        dyy = -dc * e2 * j * j * j
         u = 2 * dxx
         v = 2 * shear * dxx + stretch * dxy
         w = 2 * shear * shear * dxx + 2 * stretch * shear * dxy + 2 * stretch * stretch * dyy

@@ -214,15 +214,17 @@ class Neighbourhoods(Protocol):
     def on_jump(self) -> Bools: ...  # noqa: D102
 
     def polynomials(
-        self, vertices: Indices, degree: int, rings: int, ghosts: bool = True, kind: int = 0
+        self, vertices: Indices, degree: int, rings: int, ghosts: bool = True, kind: int = 0, nested: int = 1
     ) -> Floats:
         """Least-squares polynomials of height over the tangent planes of vertices (k,), compiled.
 
         Returns
         -------
-        (k, COLUMNS) float64
+        (k, COLUMNS) or (nested, k, COLUMNS) float64
             See :mod:`quadcurv.kernels.jet`, also for the kinds of fits. With `ghosts` neighbourhoods of up to
-            three rings go on beyond smooth borders; else, and over more rings, they end there.
+            three rings go on beyond smooth borders; else, and over more rings, they end there. With `nested`
+            2 or 3 also the fits of two and four degrees less to the same points, which then take little time;
+            not of fits with weights.
         """
 
     def border_error(self, rings: int) -> Floats:
