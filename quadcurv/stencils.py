@@ -208,22 +208,23 @@ class Edges(NamedTuple):
 
 def edges(faces: Ints) -> Edges:
     """Sort the edges of a face list by their number of faces."""
-    sides = np.where(faces[:, 3] < 0, 3, 4)
-    face, slot = np.nonzero(np.arange(4) < sides[:, None])
-    start, end = faces[face, slot], faces[face, (slot + 1) % sides[face]]
-    low, high = np.minimum(start, end), np.maximum(start, end)
-    order = np.lexsort((high, low))
-    low, high = low[order], high[order]
-    new = np.concatenate(([True], (np.diff(low) != 0) | (np.diff(high) != 0)))
-    first = np.flatnonzero(new[: len(order)])
-    count = np.diff(np.append(first, len(order)))
-    one, two, many = (first[count == 1], first[count == 2], first[count > 2])
-    alone, left, right = order[one], order[two], order[two + 1]
-    return Edges(
-        np.stack((face[alone], slot[alone]), axis=1),
-        np.stack((face[left], slot[left], face[right], slot[right]), axis=1),
-        np.stack((low[many], high[many]), axis=1),
-    )
+    triangles, ends = faces[:, 3] < 0, np.roll(faces, -1, axis=1)
+    ends[triangles, 2] = faces[triangles, 0]
+    start, end = faces.ravel(), ends.ravel()
+    edge = np.minimum(start, end).astype(np.int64) << 32 | np.maximum(start, end)
+    edge[3::4][triangles] = -1  # no edge
+    order = np.argsort(edge, kind="stable")[np.count_nonzero(triangles) :]
+    edge = edge[order]
+    first = np.flatnonzero(np.append(True, edge[1:] != edge[:-1])[: edge.size])
+    count = np.diff(np.append(first, edge.size))
+    one, two, many = (first[count == 1], first[count == 2], edge[first[count > 2]])
+    ends_of_many = np.stack((many >> 32, many & 0xFFFFFFFF), axis=1).astype(np.int32)
+    return Edges(_places(order[one]), _places(order[two], order[two + 1]), ends_of_many)
+
+
+def _places(*corners: Indices) -> Indices:
+    """Columns of faces and slots."""
+    return np.array([part for k in corners for part in (k >> 2, k & 3)]).T
 
 
 def face_pairs(faces: Ints) -> tuple[Indices, ...]:

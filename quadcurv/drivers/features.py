@@ -55,9 +55,9 @@ def features(stencils: Stencils) -> Features:
     bend = np.einsum("ex,ex->e", normals[g] - normals[f], apart)  # twisted faces turn, too
     length = np.linalg.norm(apart, axis=1)
     angle[f, i] = angle[g, j] = bend / length**2
-    other = np.full((*faces.shape, 2), -1)
-    other[f, i], other[g, j] = np.stack((g, j), axis=1), np.stack((f, i), axis=1)
-    near, far = (_following(faces, angle, other, *side) for side in ((f, i), (g, j)))
+    other = np.full(faces.size + 4, faces.size)  # the corner behind all others is of no face
+    other[4 * f + i], other[4 * g + j] = 4 * g + j, 4 * f + i
+    near, far = (_following(faces, angle, other, corner) for corner in (4 * f + i, 4 * g + j))
     step, own = np.abs(near[0] - far[0]), angle[f, i]
     calm = np.abs(np.diff((near, far), axis=1)).max(axis=(0, 1))  # NaN where a strip ends
     between = np.abs(2 * own - near[0] - far[0]) <= step
@@ -77,9 +77,11 @@ def _opposite(side: tuple[Indices, Indices]) -> tuple[Indices, Indices]:
 
 def _kinks(stencils: Stencils, other: Indices, f: Indices, i: Indices) -> Floats:
     """Sines of how far strips of quads change their direction at edges, where they meet another curvature."""
-    g, j = other[f, i].T
+    across = other[4 * f + i]
+    beyond = across < stencils.faces.size
+    g, j = np.divmod(np.where(beyond, across, 0), 4)
     turn = _slants(stencils, f, i) - _slants(stencils, g, j)
-    return np.where((g >= 0) & np.isfinite(turn), np.abs(np.sin(turn)), 0.0)
+    return np.where(beyond & np.isfinite(turn), np.abs(np.sin(turn)), 0.0)
 
 
 def _slants(stencils: Stencils, f: Indices, i: Indices) -> Floats:
@@ -107,14 +109,15 @@ def _along(stencils: Stencils, f: Indices, i: Indices) -> Bools:
     return found[:n]
 
 
-def _following(faces: Ints, values: Floats, other: Indices, f: Indices, i: Indices) -> Floats:
-    """(3, e): values at the next edges of strips of quads; NaN where they end."""
-    found = []
-    for _ in range(3):
-        opposite = (i + 2) % 4
-        found.append(np.where((f >= 0) & (faces[f, 3] >= 0), values[f, opposite], np.nan))
-        f, i = np.where((f >= 0)[:, None], other[f, opposite], -1).T
-    return np.array(found)
+def _following(faces: Ints, values: Floats, other: Indices, corner: Indices) -> Floats:
+    """(3, e): values at the next edges of strips of quads from corners 4 f + i on; NaN where they end."""
+    of_quads = np.append(np.where(faces[:, 3:] < 0, np.nan, values), np.full(4, np.nan))
+    found = np.empty((3, corner.size))
+    for k in range(3):
+        opposite = corner ^ 2
+        of_quads.take(opposite, out=found[k])
+        corner = other.take(opposite)
+    return found
 
 
 def _planes(stencils: Stencils) -> tuple[Floats, Floats]:

@@ -343,6 +343,8 @@ def _with_border_errors(found: Curvatures, around: MeshNeighbourhoods) -> Curvat
         here = around.at_border(r)
         error[at], noise[at] = np.fmax(error, here[0])[at], np.fmax(noise, here[1])[at]
     larger = error > own
+    if not larger.any():
+        return found
     factor = np.divide(error, own, out=np.ones_like(own), where=larger & (own > 0))
     errors = StandardErrors(*(e * factor for e in found.standard_error))
     return replace(

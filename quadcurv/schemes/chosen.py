@@ -74,16 +74,20 @@ class _Found:
 
         n = around.wanted.size
         self.kernel = kernel
-        self.values = np.full((n, kernel.COLUMNS), np.nan)
+        self.values = np.full((kernel.COLUMNS, n), np.nan).T
         self.degree, self.rings = np.zeros((2, n), np.int32)
         self.sigma, self.freedom = np.full((2, n), np.nan)
-        self.bias = np.full((n, 4), np.nan)
+        self.bias = np.full((4, n), np.nan).T
 
-    def put(self, at: Indices, fits: Floats, d: int, r: int, beyond: Floats | float = 0.0) -> None:
+    def put(self, at: Indices | slice, fits: Floats, d: int, r: int, beyond: Floats | float = 0.0) -> None:
         """Results of smooth fits, H being off by so much for what is beyond a border."""
         kernel, left = self.kernel, fits[:, self.kernel.FREEDOM]
         share, part = _LEFT[d]
-        self.values[at], self.degree[at], self.rings[at] = fits, d, r
+        if isinstance(at, slice):
+            self.values = fits
+        else:
+            self.values[at] = fits
+        self.degree[at], self.rings[at] = d, r
         square = np.divide(
             fits[:, kernel.SQUARE], share * left, out=np.full(len(fits), np.nan), where=left > 0
         )
@@ -108,7 +112,8 @@ class _Found:
     def errors(self, at: Any = slice(None)) -> Floats:
         """(k, 4): half of intervals that hold the exact values in 95 % of cases."""
         gain = self.values[at, self.kernel.GAIN : self.kernel.GAIN + 4]
-        noise = stdtrit(self.freedom[at], _QUANTILE)[:, None] * gain * self.sigma[at, None]
+        freedom, places = np.unique(self.freedom[at], return_inverse=True)  # they are few
+        noise = stdtrit(freedom, _QUANTILE)[places, None] * gain * self.sigma[at, None]
         return np.hypot(np.nan_to_num(noise), 2 * self.bias[at])
 
     def curvatures(self, on_crease: Bools) -> Curvatures:

@@ -111,7 +111,7 @@ def _fits(wanted: Bools, run: Run, degree: int, rings: int) -> tuple[Floats, Int
     """Results, degrees and rings of the first fits that are well conditioned and not too steep."""
     from quadcurv.kernels import jet as kernel
 
-    out = np.full((wanted.size, kernel.COLUMNS), np.nan)
+    out = np.empty((0, kernel.COLUMNS))
     degrees, grown = np.zeros((2, wanted.size), np.int32)
     most = np.full(wanted.size, rings + _GROWTH)  # rings until it is too steep
     todo = np.flatnonzero(wanted)
@@ -127,10 +127,12 @@ def _fits(wanted: Bools, run: Run, degree: int, rings: int) -> tuple[Floats, Int
                 out = fits
                 out[~good] = np.nan
             else:
+                out = out if len(out) else np.full((kernel.COLUMNS, wanted.size), np.nan).T
                 out[at[good]] = fits[good]
-            degrees[at[good]], grown[at[good]] = d, r
+            at = at[good]
+            degrees[at], grown[at] = d, r
             todo = todo[degrees[todo] == 0]
-    return out, degrees, grown
+    return out if len(out) else np.full((wanted.size, kernel.COLUMNS), np.nan), degrees, grown
 
 
 def _unpacked(out: Floats, degree: Ints, rings: Ints) -> Curvatures:
