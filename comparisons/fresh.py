@@ -115,16 +115,17 @@ def cold_calls(count: int, old: Path | None = None) -> Iterator[Ratio]:
                 with tempfile.TemporaryDirectory() as cache:
                     found.append(float(python(COLD, name, folder=folder, NUMBA_CACHE_DIR=cache)))
         what = f"nothing compiled, seconds, {name}"
-        new = _quartiles(seconds[HERE])
+        new = quartiles(seconds[HERE])
         yield Ratio(what, "imports", 4096, 1, *new, must, aim)
         if old:
-            before = _quartiles(seconds[old])
+            before = quartiles(seconds[old])
             yield Ratio(f"{what}, of the other checkout", "imports", 4096, 1, *before)
-            share = _quartiles(np.array(seconds[HERE]) / seconds[old])
+            share = quartiles(np.array(seconds[HERE]) / seconds[old])
             yield Ratio(what, "the other checkout", 4096, 1, *share, 1.0, 0.5)
 
 
-def _quartiles(values: list[float] | NDArray[np.float64]) -> tuple[float, float, float]:
+def quartiles(values: list[float] | NDArray[np.float64]) -> tuple[float, float, float]:
+    """The lower quartile, the median and the upper one."""
     low, median, high = np.quantile(values, (0.25, 0.5, 0.75)).tolist()
     return low, median, high
 
@@ -234,7 +235,7 @@ def beside(old: Path, count: int, sizes: tuple[int, int, int]) -> Iterator[Ratio
                 if job.startswith(("jet", "stiffness, "))
                 else sizes[0]
             )
-            share = _quartiles(taken[:, 0] / taken[:, 1])
+            share = quartiles(taken[:, 0] / taken[:, 1])
             # The default fit chooses at every vertex what the one of 0.1 had fixed: jet(4) is that one.
             goal = () if job.startswith("jet,") else (1.03, 1.0)
             yield Ratio(f"{job}, warm", "the other checkout", n * n, 1, *share, *goal)

@@ -32,10 +32,27 @@ class GridWindows:
         """(k, nested COLUMNS): see `Neighbourhoods`, the lower degrees behind."""
         from quadcurv.kernels import jet
 
-        normals = self._faces.averaged if kind == jet.ROUND else self._faces.stencils.ring_areas
+        normals = self._faces.averaged if kind == jet.ROUND else self._normals
         at = vertices.astype(np.int32)
         given = self.grid.points, normals, self.grid.wrap, at, degree, rings, kind
         return _over(lambda *target: jet.grid_fits(*given, *target), at.size, nested)
+
+    @cached_property
+    def _normals(self) -> Floats:
+        """(r, c, 3): across the ring of edge neighbours, missing ones being at the vertex itself.
+
+        The same in every part of a grid, to the last digit. Zero where there is none but for rounding.
+        """
+        from quadcurv.kernels import vector
+
+        points = self.grid.points
+        a, b = (_across(points, axis, wraps) for axis, wraps in enumerate(self.grid.wrap))
+        normals = np.stack(vector.cross(np.moveaxis(a, 2, 0), np.moveaxis(b, 2, 0)), axis=2)
+        square, first, second, far = (np.einsum("ijx,ijx->ij", x, x) for x in (normals, a, b, points))
+        known = square > np.maximum(vector.rounding(2 * (first + second), far), np.finfo(float).tiny)
+        if not known.all():
+            normals[~known] = 0.0
+        return normals
 
 
 class FaceRings:
@@ -88,18 +105,20 @@ class FaceRings:
         normals = self.averaged if kind == jet.ROUND else self.normals
         if len(normals) < len(s.points):
             normals = np.pad(normals, ((0, len(s.points) - len(normals)), (0, 0)))
-        ring = self._regular if rings > 1 else self._regular[:0]
-        given = s.points, s.faces, *self.corners, ring, normals, s.orientable, at, degree, rings, kind
+        windows = self._windows if rings > 1 else (np.empty(0, np.int32),) * 2
+        given = s.points, s.faces, *self.corners, *windows, normals, s.orientable, at, degree, rings, kind
         return _over(lambda *target: jet.face_fits(*given, *target), at.size, nested)
 
     @cached_property
-    def _regular(self) -> Ints:
-        """(p, 8): rings of regular vertices that are present."""
+    def _windows(self) -> tuple[Ints, Ints]:
+        """(p, 8) and (p,): rings of regular vertices that are not hidden, and their runs."""
+        from quadcurv.kernels import gather
+
         ring = self.stencils.ring
         if self._hidden.size:
             ring = ring.copy()
             ring[self._hidden, 0] = -1
-        return ring
+        return ring, gather.runs(ring)
 
     @cached_property
     def averaged(self) -> Floats:
@@ -150,6 +169,16 @@ class FaceRings:
             column
         ]
         return out
+
+
+def _across(points: Floats, axis: int, wraps: bool) -> Floats:
+    """(r, c, 3): from the neighbour before to the one behind, along one direction of a grid."""
+    x, out = np.moveaxis(points, axis, 0), np.empty_like(points)
+    way = np.moveaxis(out, axis, 0)
+    np.subtract(x[2:], x[:-2], out=way[1:-1])
+    np.subtract(x[1], x[-1 if wraps else 0], out=way[0])
+    np.subtract(x[0 if wraps else -1], x[-2], out=way[-1])
+    return out
 
 
 def bundles(points: Floats) -> Stencils:

@@ -5,6 +5,8 @@ the moments `mu` of every entry. `A` is filled with the factor, inverses on its 
 what is left of the terms' squares; its last row is that of the squares of z.
 """
 
+from functools import cache
+
 import numpy as np
 
 from quadcurv.kernels.compiled import flat
@@ -24,6 +26,7 @@ from quadcurv.kernels.moments import (
 TALL = 8  # rows that are done at once
 
 
+@cache
 def table_of(degree):
     """Moments of the entries for the terms of every second degree up to this one, and where each begins.
 

@@ -163,19 +163,21 @@ def half_row(ring, v, turn, direction, rings, at, step, around):
 
 
 @formula
-def window(ring, c, rings, mark, stamp, around):
+def window(ring, c, rings, phase, mark, stamp, around):
     """Write the neighbourhood of a regular vertex if it is a window: regular inside, no vertex there twice.
 
-    Along every third of its rows, by the rings of the vertices there.
+    Along every third of its rows, the outer ones but one among them, by the rings of the vertices there:
+    `phase` is 1 - rings modulo 3. With 1 nobody looks at the middle row but itself.
     """
     width = 2 * rings + 1
     middle = rings * width + rings
     known = 1 + 0 * c
     for across, side in ((2, 1), (6, -1)):
-        state = Carried((c, 0 * c, 0 * c, known))
+        state = Carried((c, 0 * c, phase, known))
         for j in span(0, rings):
             v, turn, since, known = state.get()
-            is_row = (since == 0) | (j == rings - 1)
+            is_row = (since == 0) | ((j == 0) & (phase == 1))
+            is_row = is_row & ((j > 0) | where(side > 0, True, False))
             rows = where(is_row, 1, 0)
             for along, step in ((0, width), (4, -1 * width)):
                 right = Carried((known,))
@@ -201,41 +203,59 @@ def window(ring, c, rings, mark, stamp, around):
 
 
 @formula
-def put(around, size, room, c, at, lane, before, index):
-    """Write a neighbourhood into a column of a block; whether its entries follow those of the first one."""
-    following = Carried((where(before, 1, 0),))
+def follow(centres, k, run, around, rings):
+    """Whether the windows of the next vertices are the first one's, every vertex replaced by its next."""
+    width, least = 2 * rings + 1, WIDTH + 0 * k
+    for lane in range(1, WIDTH):
+        least = where(centres[k + lane] == centres[k] + lane, least, 0)
+    least = Carried((least,))
+    for i in span(1, width - 1):
+        for j in span(1, width - 1):
+            (before,), here = least.get(), run[around[i * width + j]]
+            least.set((where(here < before, here, before),))
+    return least.get()[0] >= WIDTH - 1
+
+
+@formula
+def put(around, size, room, c, at, index):
+    """Write a neighbourhood into a column of a block."""
     for m in span(0, size):
-        v, (known,) = around[m], following.get()
-        following.set((where(v == index[at + m * WIDTH] + lane, known, 0),))
-        index[at + m * WIDTH + lane] = v
+        index[at + m * WIDTH] = around[m]
     for m in span(size, room):
-        index[at + m * WIDTH + lane] = c
-    return following.get()[0] > 0
+        index[at + m * WIDTH] = c
 
 
 @kernel
 def _neighbourhoods(
-    faces, indptr, corners, ring, rings, centres, blocks, room, index, counts, beside, stamp, around
+    faces, indptr, corners, ring, run, rings, centres, blocks, room, index, counts, beside, stamp, around
 ):
-    mark = stamp[stamp.size - 2]  # of the last neighbourhood
-    following = False
+    mark, phase = stamp[stamp.size - 2], (1 - rings) % 3  # the last neighbourhood's
     for k in range(WIDTH * blocks):
-        lane, c = k & 7, centres[k]
-        mark += 2
+        block, lane, c = k >> 3, k & 7, centres[k]
         m, is_window = (2 * rings + 1) * (2 * rings + 1), False
-        if ring.size > 0 and ring[8 * c] >= 0:
-            is_window = window(ring, c, rings, mark, stamp, around)
-        if not is_window:
-            m = neighbourhood(faces, indptr, corners, c, rings, mark + 1, stamp, around)
-            if m > room:
-                stamp[stamp.size - 2] = mark
-                return m
-        following = (following or lane == 0) and is_window and c == centres[k - lane] + lane
-        following = put(around, m, room, c, (k >> 3) * room * WIDTH, lane, following, index)
-        beside[k >> 3] = following
+        if lane == 0 or not beside[block]:
+            mark += 2
+            if ring.size > 0 and ring[8 * c] >= 0:
+                is_window = window(ring, c, rings, phase, mark, stamp, around)
+            if not is_window:
+                m = neighbourhood(faces, indptr, corners, c, rings, mark + 1, stamp, around)
+                if m > room:
+                    stamp[stamp.size - 2] = mark
+                    return m
+            if lane == 0:
+                beside[block] = is_window and follow(centres, k, run, around, rings)
+            put(around, m, room, c, block * room * WIDTH + lane, index)
         counts[k] = m
     stamp[stamp.size - 2] = mark
     return room
+
+
+def runs(ring):
+    """(n,) int32: how many vertices after each have its ring, with every vertex replaced by its next."""
+    ring = ring.reshape(-1, 8)
+    same = (ring[1:] - ring[:-1] == 1).all(axis=1) & (ring[:-1, 0] >= 0)
+    ends = np.append(np.flatnonzero(~same), len(ring) - 1)[: len(ring)]
+    return (np.repeat(ends, np.diff(ends, prepend=-1)) - np.arange(len(ring))).astype(np.int32)
 
 
 class Rings:
@@ -248,11 +268,13 @@ class Rings:
         Corners by vertex, see topology.corners_by_vertex.
     ring : (n, 8) or (0, 8) int32
         See topology.rings. Neighbourhoods that are windows of a grid are found by it.
+    run : (n,) or (0,) int32
+        See `runs`.
     rings : int
     """
 
-    def __init__(self, faces, indptr, corners, ring, rings):
-        self._given = flat(faces), flat(indptr), flat(corners), flat(ring), rings
+    def __init__(self, faces, indptr, corners, ring, run, rings):
+        self._given = flat(faces), flat(indptr), flat(corners), flat(ring), flat(run), rings
         # Which neighbourhood a vertex was last in; behind the vertices, the number of the last one.
         self._stamp = np.zeros(indptr.size + 1, np.int32)
         self._around = np.empty(max(indptr.size + 4, (2 * rings + 1) ** 2), np.int32)

@@ -236,7 +236,7 @@ def grid_fits(points, normals, wrap, vertices, degree, rings, kind, out, start, 
 
 
 def face_fits(
-    points, faces, indptr, corners, ring, normals, sided, vertices, degree, rings, kind, out, start, stop
+    points, faces, indptr, corners, ring, run, normals, sided, vertices, degree, rings, kind, out, start, stop
 ):
     """Fit vertices of a face list over all vertices of `rings` rings of faces around them.
 
@@ -246,8 +246,8 @@ def face_fits(
     faces : (m, 4) int32
     indptr, corners
         Corners by vertex, see topology.corners_by_vertex.
-    ring : (p, 8) int32
-        See topology.rings.
+    ring, run
+        Where windows are, see gather.Rings.
     normals : (p, 3) float64
         Of any length, zero where nobody knows one.
     sided : bool
@@ -257,5 +257,5 @@ def face_fits(
     degree, rings, kind, out, start, stop
         As for grid_fits.
     """
-    around = Rings(faces, indptr, corners, ring, rings)
+    around = Rings(faces, indptr, corners, ring, run, rings)
     _fits(points, normals, vertices, degree, kind, rings, sided, around.put, out, start, stop)

@@ -21,6 +21,7 @@ from quadcurv.kernels.formulas import (
     Carried,
     formula,
     lanes,
+    muladd,
     put_lanes,
     real,
     root,
@@ -94,7 +95,7 @@ def point(P, m):
 
 def inner(a, b):
     """Inner product."""
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+    return muladd(a[0], b[0], muladd(a[1], b[1], a[2] * b[2]))
 
 
 def gathered(values, index, at):
@@ -126,6 +127,10 @@ def beside(values, index, at):
     return three_lanes(values, 3 * index[at])
 
 
+# What is done wherever neighbours are has its fused products written out: what is left to the compiler might
+# differ between the two ways of reading them, and results would depend on how vertices are cut into blocks.
+
+
 def _into_frames(points, index, first, size, is_round, P, lane, triples=gathered):
     """Positions in the frames; the spheres nearest to them: z + b d^2 / 2 = 0 by least squares."""
     origin, axes = rows(lane, ORIGIN), [rows(lane, AXES + i) for i in (0, 3, 6)]
@@ -138,7 +143,7 @@ def _into_frames(points, index, first, size, is_round, P, lane, triples=gathered
         for i, x in enumerate(turned):
             put_row(P, ROWS * m + i, x)
         square, (above, fourth) = inner(turned, turned), sums.get()
-        sums.set((above + turned[2] * square, fourth + square * square))
+        sums.set((muladd(turned[2], square, above), muladd(square, square, fourth)))
     above, fourth = sums.get()
     bend = where(fourth > 0, -2.0 * above / fourth, 0.0)
     put_row(lane, BEND, where(is_round, bend, 0.0))
@@ -157,21 +162,21 @@ def _into_planes(normals, index, first, size, P, lane, triples=gathered):
     for m in span(0, size):
         d = point(P, m)
         x, y, z = d
-        square, half = inner(d, d), 1.0 + bend * z / 2
-        share = half * half + bend * bend / 4 * (x * x + y * y)
+        square, half = inner(d, d), muladd(bend / 2, z, 1.0)
+        share = muladd(half, half, bend * bend / 4 * muladd(x, x, y * y))
         # Nothing is seen of what lies next to the opposite point of the sphere.
         seen = (share > FARTHEST) & (count > real(m))
         known, inverse = where(seen, 1.0, 0.0), where(seen, 1.0 / share, 0.0)
         normal = triples(normals, index, (first + m) * WIDTH)
         a = [inner(axis, normal) for axis in axes]
         # Mirrored by the inversion at n + b d / 2, of square D, and turned over: here D times that.
-        up = 2.0 * half * (a[2] + bend / 2 * inner(a, d)) - share * a[2]
+        up = 2.0 * half * muladd(bend / 2, inner(a, d), a[2]) - share * a[2]
         steep = where(is_steep(up, inner(a, a) * share * share), 1.0, 0.0)
-        x, y, z = x * inverse, y * inverse, (z + bend * square / 2) * inverse
+        x, y, z = x * inverse, y * inverse, muladd(bend / 2, square, z) * inverse
         for i, value in enumerate((x, y, z, known)):
             put_row(P, ROWS * m + i, value)
-        more = known, x * x, x * y, y * y, steep
-        sums.set(tuple(s + value for s, value in zip(sums.get(), more, strict=True)))
+        more = (known, 1.0), (x, x), (x, y), (y, y), (steep, 1.0)
+        sums.set(tuple(muladd(*pair, s) for s, pair in zip(sums.get(), more, strict=True)))
     count, xx, xy, yy, steep = sums.get()
     put_row(lane, COUNT, count)
     put_row(lane, STEEP, steep)
@@ -184,25 +189,25 @@ def _into_planes(normals, index, first, size, P, lane, triples=gathered):
     put_row(lane, YY, root(where(square < 0, 0.0, square)))
 
 
-@step()
+@formula
 def into_frames(points, index, first, size, is_round, P, lane):
     """`_into_frames` wherever neighbours are."""
     _into_frames(points, index, first, size, is_round, P, lane)
 
 
-@step()
+@formula
 def into_frames_beside(points, index, first, size, is_round, P, lane):
     """`_into_frames` where those of a row of the block follow each other."""
     _into_frames(points, index, first, size, is_round, P, lane, beside)
 
 
-@step()
+@formula
 def into_planes(normals, index, first, size, P, lane):
     """`_into_planes` wherever neighbours are."""
     _into_planes(normals, index, first, size, P, lane)
 
 
-@step()
+@formula
 def into_planes_beside(normals, index, first, size, P, lane):
     """`_into_planes` where those of a row of the block follow each other."""
     _into_planes(normals, index, first, size, P, lane, beside)
