@@ -19,9 +19,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 import quadcurv as qc
-from comparisons import performance
 from comparisons.fresh import quartiles
 from comparisons.goals import Ratio
+from comparisons.meshes import torus, triangles
 
 Floats = NDArray[np.float64]
 SIZES = {100: 9, 256: 5, 1000: 2}
@@ -30,27 +30,27 @@ NOISE = (0.0, 1e-3, 1e-2, 5e-2)
 """Of every coordinate, in spacings."""
 
 
-def torus(n: int, noise: float = 0.0) -> Floats:
-    """The torus of `performance` with noise."""
-    points = performance.torus(n)
+def noisy(n: int, noise: float) -> Floats:
+    """The torus with noise."""
+    points = torus(n)
     spacing = np.linalg.norm(np.diff(points, axis=0), axis=2).mean()
     return points + np.random.default_rng(0).normal(size=points.shape) * noise * spacing
 
 
 def meshes(n: int, noise: float = 0.0) -> Iterator[tuple[str, Any, NDArray[np.int64]]]:
     """Meshes of n^2 vertices by name, and their triangles."""
-    rng, points = np.random.default_rng(1), torus(n, noise)
+    rng, points = np.random.default_rng(1), noisy(n, noise)
     grid = qc.QuadGrid(points, (True, True))
     flat, faces = points.reshape(-1, 3), grid.stencils().faces.astype(np.int64)
-    cut = performance.triangles(faces)
+    cut = triangles(faces)
     yield "grid", grid, cut
     sides = qc.QuadGrid(points)
     quads = sides.stencils().faces.astype(np.int64)
-    yield "open grid", sides, performance.triangles(quads)
+    yield "open grid", sides, triangles(quads)
     yield "quads", qc.QuadMesh(flat, faces), cut
     order = rng.permutation(len(flat))
     shuffled = np.argsort(order)[faces][rng.permutation(len(faces))]
-    yield "quads, shuffled", qc.QuadMesh(flat[order], shuffled), performance.triangles(shuffled)
+    yield "quads, shuffled", qc.QuadMesh(flat[order], shuffled), triangles(shuffled)
     some = rng.random(len(faces)) < 0.3
     pieces = np.concatenate((faces[some, :3], faces[some][:, [2, 3, 0]]))
     mixed = np.concatenate((faces[~some], np.pad(pieces, ((0, 0), (0, 1)), constant_values=-1)))

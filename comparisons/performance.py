@@ -22,9 +22,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 import quadcurv as qc
+from comparisons import fit_speed
 from comparisons.common import OUTPUT
 from comparisons.fresh import beside, cold_calls, first_call, memory
 from comparisons.goals import Ratio
+from comparisons.meshes import torus, triangles
 from comparisons.operations import operations
 from comparisons.speed import Times, markdown, plots
 from quadcurv.kernels import ranges
@@ -39,13 +41,6 @@ SIZES = {256: 7, 1024: 7, 2048: 3}
 """Vertices in each direction, 65 thousand, 1 and 4 million, and rounds."""
 LOOP = 0.1  # seconds, of calls that are repeated
 QUAD_MATRICES = ("bilinear", "bunge", "de_goes", "alexa_wardetzky")
-
-
-def torus(n: int) -> Floats:
-    """(n, n, 3) points that wrap in both directions; the normal points outward."""
-    u, v = np.meshgrid(*[2 * np.pi * np.arange(n) / n] * 2, indexing="ij")
-    r = 3 + np.cos(u) + 0.2 * np.sin(3 * v)
-    return np.stack([r * np.cos(v), r * np.sin(v), np.sin(u)], axis=-1)
 
 
 def numpy_finite_volume(points: Floats) -> Floats:
@@ -130,11 +125,6 @@ def face_lists(n: int) -> dict[str, tuple[Floats, NDArray[np.int64]]]:
     return {"natural": (points, faces), "shuffled": (points[order], shuffled)}
 
 
-def triangles(faces: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Each quad cut along its first diagonal."""
-    return np.ascontiguousarray(np.concatenate((faces[:, [0, 1, 2]], faces[:, [2, 3, 0]])))
-
-
 def peer_jobs(points: Floats, faces: NDArray[np.int64]) -> Iterator[tuple[str, Job]]:
     """Mean curvature by every other library that is installed; meshes are made beforehand."""
     cut, n = triangles(faces), len(points)
@@ -179,7 +169,6 @@ def peer_jobs(points: Floats, faces: NDArray[np.int64]) -> Iterator[tuple[str, J
             pass
         else:
             yield "robust_laplacian", lambda: robust_laplacian.mesh_laplacian(points, cut)[0] @ points
-        yield "igl.principal_curvature", lambda: igl.principal_curvature(points, cut, radius=2)
 
 
 def face_jobs(n: int) -> tuple[Jobs, Jobs]:
@@ -203,9 +192,6 @@ def face_jobs(n: int) -> tuple[Jobs, Jobs]:
     points, faces = lists["natural"]
     cut = triangles(faces)
     peers = dict(peer_jobs(points, faces))
-    if "igl.principal_curvature" in peers:
-        ours["jet, one call"] = partial(qc.principal_curvatures, (points, faces))
-        ours["jet, grid"] = partial(qc.principal_curvatures, qc.QuadGrid(torus(n), (True, True)))
     mesh = qc.QuadMesh(points, faces)
     S = qc.stiffness_matrix(mesh, "finite_volume")
     ours["stiffness"] = lambda: qc.stiffness_matrix(mesh, "finite_volume")
@@ -290,9 +276,6 @@ def of_faces(n: int, threads: int, times: dict[str, Floats]) -> Iterator[Ratio]:
     if "igl.cotmatrix(V, I, C)" in times:
         for scheme in QUAD_MATRICES:
             yield ratio(f"stiffness, {scheme}", "igl.cotmatrix(V, I, C)", times, False, **goal(1, 5))
-    for name in ("jet, one call", "jet, grid"):
-        if name in times:
-            yield ratio(name, "igl.principal_curvature", times, False, **goal(12, 20))
 
 
 def growth(times: Mapping[int, Mapping[str, Floats]]) -> dict[str, float]:
@@ -320,6 +303,7 @@ def measure(quick: bool, old: Path | None = None) -> tuple[list[Ratio], Times, d
         used, peak = memory(128 if quick else 1024) if sys.platform == "linux" else (None, {})
         ratios += [r for r in (used, first_call(3 if quick else 9)) if r]
         ratios += cold_calls(1 if quick else 5, old)
+        ratios += fit_speed.measured(quick)
         if old:
             ratios += beside(old, 2 if quick else 9, (64, 32, 16) if quick else (1024, 200, 128))
     finally:
