@@ -156,14 +156,28 @@ def by_noise(s, scheme, size):
     return 5 * gain(s.name, s.n, scheme) * size * magnified
 
 
-def near(faces, vertices, size, reach=1):
-    """Mask of the vertices within `reach` faces of some."""
+def around(s, faces, vertices, size, off):
+    """What vertices (size,) are off by: `off` within two faces of some, and 0.02 k where strips end at them.
+
+    These are the vertices of two rows along open sides within eight cells, where fits become one-sided.
+    """
     mask = np.zeros(size, bool)
     mask[vertices] = True
-    for _ in range(reach):
+    there = mask[: s.xi.size].reshape(s.xi.shape)
+    strips = windows(there, s.surface.wrap, 8).any(axis=(2, 3)) & border(s, 2)
+    for _ in range(2):
         for face in faces:
             if mask[list(face)].any():
                 mask[list(face)] = True
+    return np.where(mask, off, np.append(0.02 * s.bend * strips, np.zeros(size - s.xi.size)))
+
+
+def border(s, rows):
+    """(r, c): mask of rows and columns along open sides."""
+    mask = np.zeros(s.xi.shape, bool)
+    for axis, wraps in enumerate(s.surface.wrap):
+        if not wraps:
+            np.moveaxis(mask, axis, 0)[[*range(rows), *range(-rows, 0)]] = True
     return mask
 
 
@@ -240,7 +254,7 @@ def with_vertex(s, rng, where, off):
     H = np.append(s.H.ravel(), s.surface.mean_curvature(xi, eta))
     sides = points[quad] - points[np.roll(quad, 1)]
     local = off / np.linalg.norm(sides, axis=1).min()
-    explained = np.where(near(faces, [*quad, new], H.size, 2), local, 0.0)
+    explained = around(s, faces, [*quad, new], H.size, local)
     return Damaged(points, lambda x: qc.QuadMesh(x, faces), H, explained)
 
 
@@ -267,7 +281,7 @@ def hanging_node(s, rng):
     flat = s.points.reshape(-1, 3)
     points = np.vstack((flat, (flat[a] + flat[b]) / 2))
     H = np.append(s.H.ravel(), (s.H.ravel()[a] + s.H.ravel()[b]) / 2)
-    explained = np.where(near(faces, [*faces[k]], H.size, 2), s.bend, 0.0)
+    explained = around(s, faces, faces[k], H.size, s.bend)
     return Damaged(points, lambda x: qc.QuadMesh(x, faces), H, explained)
 
 
@@ -277,7 +291,7 @@ def collapsed(s, rng):
     a, b, c, d = faces[k]
     faces[k] = [a, b, c, c]
     faces.append([a, c, d, d])
-    explained = np.where(near(faces, [a, b, c, d], s.xi.size, 2), 0.1 * s.bend, 0.0)
+    explained = around(s, faces, [a, b, c, d], s.xi.size, 0.1 * s.bend)
     return Damaged(s.points.reshape(-1, 3), lambda x: qc.QuadMesh(x, faces), s.H.ravel(), explained)
 
 
@@ -307,7 +321,7 @@ def fin(s, rng):
     points = np.vstack((flat, flat[[a, b]] + up))
     faces.append([b, a, n, n + 1])
     H = np.append(s.H.ravel(), [np.nan, np.nan])  # of the fin's own vertices there is no exact H
-    explained = np.where(near(faces, [a, b], n + 2, 2), 0.05 * s.bend, 0.0)
+    explained = around(s, faces, [a, b], n + 2, 0.05 * s.bend)
     return Damaged(points, lambda x: qc.QuadMesh(x, faces), H, explained)
 
 
@@ -325,12 +339,8 @@ def hole(s, rng):
     given = points.copy()
     given[hidden] = np.nan
     mask = hidden if rng.random() < 0.5 else None
-    border = np.zeros(hidden.shape, bool)
-    for axis, wraps in enumerate(s.surface.wrap):
-        if not wraps:
-            np.moveaxis(border, axis, 0)[[0, 1, -2, -1]] = True
     beside, near_it = (windows(hidden, s.surface.wrap, k).any(axis=(2, 3)) for k in (2, 5))
-    explained = np.where(beside | (border & near_it), one_sided(s), 0.0)
+    explained = np.where(beside | (border(s, 2) & near_it), one_sided(s), 0.0)
     return Damaged(given, lambda x: qc.QuadGrid(x, s.surface.wrap, mask=mask), s.H, explained)
 
 
@@ -341,8 +351,8 @@ def one_sided(s):
     """
     off = np.zeros(s.xi.shape)
     for k in s.surface.principal_curvatures(s.xi, s.eta):
-        around = windows(np.broadcast_to(k, s.xi.shape), s.surface.wrap, 3)
-        off = np.maximum(off, np.abs(around - k[..., None, None]).max(axis=(2, 3)))
+        seen = windows(np.broadcast_to(k, s.xi.shape), s.surface.wrap, 3)
+        off = np.maximum(off, np.abs(seen - k[..., None, None]).max(axis=(2, 3)))
     return 2 * off + (s.bend * s.edge) ** 2 * s.bend
 
 
