@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 from pathlib import Path
 
 import numpy as np
@@ -45,3 +46,27 @@ def shared_meshes() -> Path:
     if not SHARED_MESHES.is_dir():
         pytest.skip(f"no folder of real meshes at {SHARED_MESHES}")
     return SHARED_MESHES
+
+
+@pytest.fixture(scope="module")
+def browser():
+    """A browser without a window, and without a network."""
+    if shutil.which("chromedriver") is None or shutil.which("chromium") is None:
+        pytest.skip("not installed: chromium and chromium-driver")
+    webdriver = pytest.importorskip("selenium.webdriver")
+    options = webdriver.ChromeOptions()
+    options.binary_location = shutil.which("chromium")
+    for argument in (
+        "headless=new",
+        "no-sandbox",
+        "use-angle=swiftshader",
+        "enable-unsafe-swiftshader",
+        "window-size=1000,700",
+        "host-resolver-rules=MAP * ~NOTFOUND",
+    ):
+        options.add_argument(f"--{argument}")
+    options.set_capability("goog:loggingPrefs", {"browser": "ALL", "performance": "ALL"})
+    service = webdriver.ChromeService(shutil.which("chromedriver"))
+    driver = webdriver.Chrome(options, service)
+    yield driver
+    driver.quit()

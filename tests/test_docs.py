@@ -81,20 +81,49 @@ def test_guide_names_every_scheme():
         assert f"`{scheme}`" in text or (f"`{stem}`" in text and "`-voronoi`" in text), scheme
 
 
-@pytest.mark.slow
-def test_builds_without_a_warning(tmp_path):
+CLIPPED = """
+const scrolls = e => { for (; e && !e.matches('article'); e = e.parentElement)
+  if (/auto|scroll/.test(getComputedStyle(e).overflowX)) return true;
+  return false };
+return [...document.querySelectorAll('article :is(p, dt, dd, h1, h2, h3, li, code, td, th, img, iframe)')]
+  .filter(e => e.getBoundingClientRect().right > innerWidth + 1 && !scrolls(e))
+  .map(e => e.tagName + ' ' + e.textContent.slice(0, 40)).slice(0, 3)
+"""
+
+
+@pytest.fixture(scope="module")
+def site(tmp_path_factory):
+    """The pages, built without a warning."""
     pytest.importorskip("sphinx_gallery")
     pytest.importorskip("pymeshlab", exc_type=ImportError)
-    command = [sys.executable, "-m", "sphinx", "-W", "--keep-going", "-q", "-E", DOCS, tmp_path / "html"]
-    run = subprocess.run(command, capture_output=True, text=True, timeout=600, check=False)
+    folder = tmp_path_factory.mktemp("site") / "html"
+    command = [sys.executable, "-m", "sphinx", "-W", "--keep-going", "-q", "-E", DOCS, folder]
+    run = subprocess.run(command, capture_output=True, text=True, timeout=900, check=False)
     assert run.returncode == 0, run.stderr
-    page = (tmp_path / "html" / "auto_examples" / "cubed_sphere.html").read_text()
+    return folder
+
+
+@pytest.mark.slow
+def test_pages_load_nothing_from_elsewhere(site):
+    page = (site / "auto_examples" / "cubed_sphere.html").read_text()
     assert "<iframe srcdoc=" in page
-    for built in (tmp_path / "html").rglob("*.html"):
+    for built in site.rglob("*.html"):
         loaded = re.findall(
             r"<(?:script|link|img|iframe)[^>]*(?:src|href)=.(https?://[^\"']+)", built.read_text()
         )
         assert not loaded, f"{built.name} loads {loaded}"
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("width", [400, 800, 1600])
+def test_nothing_is_cut_on_screens_of_any_width(site, browser, width):
+    screen = {"width": width, "height": 900, "deviceScaleFactor": 1, "mobile": False}
+    browser.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", screen)
+    for page in site.rglob("*.html"):
+        if "_static" not in page.parts:
+            browser.get(page.as_uri())
+            assert browser.execute_script(CLIPPED) == [], page.name
+    browser.execute_cdp_cmd("Emulation.clearDeviceMetricsOverride", {})
 
 
 def test_the_paper_cites_what_it_lists_and_names_files_that_exist():
