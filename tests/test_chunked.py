@@ -388,6 +388,32 @@ def test_grids_in_vtkhdf_files(tmp_path, monkeypatch, most):
         assert equal(read["k1"], qc.curvatures(grid, "jet-2").k1.ravel())
 
 
+@pytest.mark.parametrize("chunks", [(1, 1), (13, 5), (4, 12)], ids=str)
+@pytest.mark.parametrize("wrap", WRAPS)
+@pytest.mark.parametrize("kind", ["npy", "zarr", "h5py"])
+def test_any_chunks_on_disk(tmp_path, small, kind, wrap, chunks):
+    """Chunks of 1, last ones of 2, in arrays of every library, read and written."""
+    x = points("rough", wrap, 15, 14)
+    H = np.empty(x.shape[:2])
+    if kind == "npy":
+        np.save(tmp_path / "x.npy", x)
+        source = np.load(tmp_path / "x.npy", mmap_mode="r")
+        target = np.lib.format.open_memmap(tmp_path / "H.npy", "w+", float, H.shape)
+    else:
+        library = pytest.importorskip(kind)
+        if kind == "zarr":
+            group = library.open_group(library.storage.MemoryStore(), mode="w")
+            make = group.create_array
+        else:
+            make = library.File(tmp_path / "x.h5", "w").create_dataset
+        source = make("x", shape=x.shape, chunks=(*chunks, 3), dtype="f8")
+        target = make("H", shape=H.shape, chunks=chunks, dtype="f8")
+        source[:] = x
+    for scheme in ("finite_volume", "jet-2"):
+        qc.evaluate(qc.ChunkedGrid(source, wrap), scheme=scheme, out={"mean_curvature": target})
+        assert equal(target[:], qc.mean_curvature(qc.QuadGrid(x, wrap), scheme))
+
+
 def test_single_precision_and_a_leading_dimension(small):
     x = np.stack([points("smooth", (False, True)), 2 * points("rough", (False, True))]).astype(np.float32)
     found = qc.mean_curvature(qc.ChunkedGrid(x, (False, True)), "liu")

@@ -110,6 +110,13 @@ def test_fits_are_bitwise_one_mesh(mesh, tmp_path):
             check(one, qc.evaluate(parts, *one, scheme=scheme, boundary=boundary))
 
 
+@pytest.mark.parametrize("mesh", ["sheet", "shuffled mixed"])
+def test_parts_of_one_vertex(mesh, tmp_path):
+    points, faces = MESHES[mesh]
+    whole = qc.evaluate(qc.QuadMesh(points, faces), *WANTED)
+    check(whole, qc.evaluate(qc.FaceParts(points, faces, tmp_path, parts=len(points)), *WANTED))
+
+
 def stacked(errors):
     return np.stack(errors, axis=-1)
 
