@@ -8,12 +8,12 @@ _BITS = 21  # of each coordinate
 
 
 @helper
-def owner(cuts, v):
-    """The part whose range of vertices holds v."""
-    low, high = 0, cuts.size - 1
+def place_of(values, count, v):
+    """The last place of so many ascending values whose value is v at most."""
+    low, high = 0, count
     while high - low > 1:
         middle = (low + high) // 2
-        if cuts[middle] <= v:
+        if values[middle] <= v:
             low = middle
         else:
             high = middle
@@ -29,7 +29,7 @@ def _owners(faces, cuts, number, part, count):
             if v >= 0:
                 v = number[v] if renumbered else v
                 if v < cuts[last] or v >= cuts[last + 1]:  # mostly it is the part of the corner before
-                    last = owner(cuts, v)
+                    last = place_of(cuts, cuts.size - 1, v)
                 p = last
             for t in range(s):
                 if part[4 * f + t] == p:
@@ -114,14 +114,7 @@ def _placed(faces, begin, own, beyond, place, out):
             elif k >= 0 and k < own.size:
                 out[4 * f + s] = own[k]
             else:
-                low, high = 0, beyond.size
-                while high - low > 1:
-                    middle = (low + high) // 2
-                    if beyond[middle] <= v:
-                        low = middle
-                    else:
-                        high = middle
-                out[4 * f + s] = place[low]
+                out[4 * f + s] = place[place_of(beyond, beyond.size, v)]
 
 
 def placed(faces, begin, own, beyond, place):
