@@ -291,7 +291,7 @@ def collapsed(s, rng):
     a, b, c, d = faces[k]
     faces[k] = [a, b, c, c]
     faces.append([a, c, d, d])
-    explained = around(s, faces, [a, b, c, d], s.xi.size, 0.1 * s.bend)
+    explained = around(s, faces, [a, b, c, d], s.xi.size, 0.3 * s.bend)
     return Damaged(s.points.reshape(-1, 3), lambda x: qc.QuadMesh(x, faces), s.H.ravel(), explained)
 
 
