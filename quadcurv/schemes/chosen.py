@@ -231,8 +231,11 @@ def _at_sides(around: Neighbourhoods, vertices: Indices, first: Floats, found: _
         whole = np.full((n, 1), np.nan)
         whole[vertices[at], 0] = own
         error = np.full(vertices.size, np.inf)
-        # Neighbours tell more than one vertex, but those on the border itself may be worse off.
-        error[at] = np.minimum(own, around.pooled(whole)[vertices[at], 0])
+        # Neighbours tell more than one vertex, but those on the border itself may be worse off. A fit that is
+        # hardly determined may look good by chance, here or beside.
+        near = around.pooled(whole)[vertices[at], 0]
+        hardly = here[at, kernel.CONDITION] > _CONDITION[d]
+        error[at] = np.where(hardly, np.maximum(own, near), np.minimum(own, near))
         fits.append(here)
         errors.append(error)
     best = np.argmin(errors, axis=0)
