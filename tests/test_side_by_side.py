@@ -169,3 +169,26 @@ def test_means_are_of_what_is_known():
     values = np.array([[1.0, np.nan], [3.0, 2.0], [np.inf, 4.0]])
     expected = [[2.0, 2.0], [3.0, 3.0], [np.nan, 4.0]]
     np.testing.assert_array_equal(nearby.means(indptr, indices, values), expected)
+
+
+@pytest.mark.parametrize("wrap", [(True, True), (False, True), (False, False)])
+@pytest.mark.parametrize("rings", [1, 3])
+def test_windows_of_grids_end_at_its_sides(rings, wrap):
+    rows, columns = 12, 30
+    blocks, found = gather.Blocks((2 * rings + 1) ** 2), []
+    blocks.begin(np.arange(rows * columns, dtype=np.int32))
+    gather.windows((rows, columns), wrap, rings, blocks)
+    index = blocks.index.reshape(-1, blocks.room, WIDTH)
+    for k in range(rows * columns):
+        i, j = divmod(k, columns)
+        at = [np.arange(x - rings, x + rings + 1) for x in (i, j)]
+        at = [
+            x % n if wraps else x[(x >= 0) & (x < n)]
+            for x, n, wraps in zip(at, (rows, columns), wrap, strict=True)
+        ]
+        block, lane, count = k // WIDTH, k % WIDTH, blocks.counts[k]
+        here = index[block, :count, 0] + lane if blocks.beside[block] else index[block, :count, lane]
+        np.testing.assert_array_equal(here, np.add.outer(at[0] * columns, at[1]).ravel())
+        found.append(blocks.beside[block])
+    assert any(found)
+    assert not all(found)

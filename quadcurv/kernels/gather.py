@@ -70,27 +70,31 @@ def fill(index, at, begin, end, v):
         index[at + m * WIDTH] = v
 
 
+@formula
+def in_a_row(centres, k):
+    """Whether the vertices of a block, from the k-th on, follow each other."""
+    found = centres[k] == centres[k]
+    for lane in range(1, WIDTH):
+        found = found & (centres[k + lane] == centres[k] + lane)
+    return found
+
+
 @kernel
 def _windows(row_of, column_of, rings, centres, blocks, index, counts, beside):
     rows, columns = row_of.size - 2 * rings, column_of.size - 2 * rings
     room = (2 * rings + 1) * (2 * rings + 1)
-    for block in range(blocks):
-        c, at = centres[block * WIDTH], block * room * WIDTH
+    for k in range(WIDTH * blocks):
+        block, at, c = k >> 3, (k >> 3) * room * WIDTH + (k & 7), centres[k]
         i, j = c // columns, c % columns
-        following = rings <= i < rows - rings and rings <= j < columns - rings - WIDTH + 1
-        for k in range(block * WIDTH, (block + 1) * WIDTH):
-            following = following and centres[k] == c + k - block * WIDTH
-        beside[block] = following
-        if following:
-            window_beside(c, rings, columns, at, index)
-        for k in range(block * WIDTH, (block + 1) * WIDTH):
-            counts[k] = room
-            if not following:
-                c = centres[k]
-                m = clipped_window(row_of, column_of, columns, c // columns, c % columns, rings, at, index)
-                fill(index, at, m, room, c)
-                counts[k] = m
-            at += 1
+        if (k & 7) == 0:
+            inside = rings <= i < rows - rings and rings <= j < columns - rings - WIDTH + 1
+            beside[block] = inside and in_a_row(centres, k)
+            if beside[block]:
+                window_beside(c, rings, columns, at, index)
+        counts[k] = room
+        if not beside[block]:
+            counts[k] = clipped_window(row_of, column_of, columns, i, j, rings, at, index)
+            fill(index, at, counts[k], room, c)
 
 
 def windows(shape, wrap, rings, blocks):
@@ -203,12 +207,9 @@ def window(ring, c, rings, phase, mark, stamp, around):
 
 
 @formula
-def follow(centres, k, run, around, rings):
+def follow(run, around, rings):
     """Whether the windows of the next vertices are the first one's, every vertex replaced by its next."""
-    width, least = 2 * rings + 1, WIDTH + 0 * k
-    for lane in range(1, WIDTH):
-        least = where(centres[k + lane] == centres[k] + lane, least, 0)
-    least = Carried((least,))
+    width, least = 2 * rings + 1, Carried((WIDTH + 0 * rings,))
     for i in span(1, width - 1):
         for j in span(1, width - 1):
             (before,), here = least.get(), run[around[i * width + j]]
@@ -243,7 +244,7 @@ def _neighbourhoods(
                     stamp[stamp.size - 2] = mark
                     return m
             if lane == 0:
-                beside[block] = is_window and follow(centres, k, run, around, rings)
+                beside[block] = is_window and in_a_row(centres, k) and follow(run, around, rings)
             put(around, m, room, c, block * room * WIDTH + lane, index)
         counts[k] = m
     stamp[stamp.size - 2] = mark

@@ -4,6 +4,7 @@ import numpy as np
 
 from quadcurv.kernels import ranges
 from quadcurv.kernels.compiled import flat, kernel
+from quadcurv.kernels.formulas import Carried, formula, real, span, where
 
 FACES = 16  # of a vertex, of which others are passed over: as many lie around a pole as anybody wants to see
 
@@ -61,17 +62,23 @@ def rings_around(faces, indptr, corners, vertices, rings, room):
     return around, ring
 
 
+@formula
+def mean(indptr, indices, values, columns, column, v):
+    """Of the finite values of one column over the neighbours of a vertex."""
+    sums = Carried((0.0, 0))
+    for k in span(indptr[v], indptr[v + 1]):
+        x, (total, count) = values[indices[k] * columns + column], sums.get()
+        known = x - x == 0.0
+        sums.set((total + where(known, x, 0.0), count + where(known, 1, 0)))
+    total, count = sums.get()
+    return total / real(count)
+
+
 @kernel
 def _means(indptr, indices, values, columns, out, start, stop):
     for v in range(start, stop):
         for column in range(columns):
-            total, count = 0.0, 0
-            for k in range(indptr[v], indptr[v + 1]):
-                x = values[indices[k] * columns + column]
-                if x - x == 0:
-                    total += x
-                    count += 1
-            out[v * columns + column] = total / count
+            out[v * columns + column] = mean(indptr, indices, values, columns, column, v)
 
 
 def means(indptr, indices, values):
