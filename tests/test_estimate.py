@@ -85,6 +85,7 @@ def test_richardson_correction_raises_the_order():
     assert fitted_rate((32, 64, 128), errors) > 3.7
 
 
+@pytest.mark.filterwarnings("ignore:the first and the last:quadcurv.MeshWarning")  # cut open
 @pytest.mark.parametrize("wrap", [(True, False), (False, True)])
 def test_estimates_have_the_shape_and_place_of_the_grid(wrap):
     """A sampled torus, cut open or not: vertices between coarse ones get the mean of their neighbours."""
