@@ -156,10 +156,10 @@ def _fit(
         frames(points, normals, centres, counts, block, lane)
         if beside[block]:
             into_frames_beside(points, index, first, size, kind != PLAIN, P, lane)
-            into_planes_beside(normals, index, first, size, P, lane)
+            into_planes_beside(normals, index, first, size, kind == ROUND, P, lane)
         else:
             into_frames(points, index, first, size, kind != PLAIN, P, lane)
-            into_planes(normals, index, first, size, P, lane)
+            into_planes(normals, index, first, size, kind == ROUND, P, lane)
         into_maps(P, size, kind == SMOOTH, lane)
         clear(mu, szz + 1)
         for begin in range(0, size, CHUNK):

@@ -154,8 +154,12 @@ def is_steep(up, square):
     return (1.0 + SLOPE * SLOPE) * up * where(up < 0, -up, up) < square
 
 
-def _into_planes(normals, index, first, size, P, lane, triples=gathered):
-    """Make the spheres planes; second moments; which are too steep: not where a normal is NaN or zero."""
+def _into_planes(normals, index, first, size, is_even, P, lane, triples=gathered):
+    """Make the spheres planes; second moments; which are too steep: not where a normal is NaN or zero.
+
+    Of points of one noise that in height grows with lengths and with the inverse cosine of the slope: where
+    it is to be even, points have the inverse of its square for weights.
+    """
     axes, bend, count = [rows(lane, AXES + i) for i in (0, 3, 6)], row(lane, BEND), row(lane, POINTS)
     zero = 0.0 * count
     sums = Carried((zero,) * 5)
@@ -173,7 +177,8 @@ def _into_planes(normals, index, first, size, P, lane, triples=gathered):
         up = 2.0 * half * muladd(bend / 2, inner(a, d), a[2]) - share * a[2]
         steep = where(is_steep(up, inner(a, a) * share * share), 1.0, 0.0)
         x, y, z = x * inverse, y * inverse, muladd(bend / 2, square, z) * inverse
-        for i, value in enumerate((x, y, z, known)):
+        even = where(inner(a, a) > 0, up * up / inner(a, a), share * share)
+        for i, value in enumerate((x, y, z, known * where(is_even & seen, even, 1.0))):
             put_row(P, ROWS * m + i, value)
         more = (known, 1.0), (x, x), (x, y), (y, y), (steep, 1.0)
         sums.set(tuple(muladd(*pair, s) for s, pair in zip(sums.get(), more, strict=True)))
@@ -202,15 +207,15 @@ def into_frames_beside(points, index, first, size, is_round, P, lane):
 
 
 @formula
-def into_planes(normals, index, first, size, P, lane):
+def into_planes(normals, index, first, size, is_even, P, lane):
     """`_into_planes` wherever neighbours are."""
-    _into_planes(normals, index, first, size, P, lane)
+    _into_planes(normals, index, first, size, is_even, P, lane)
 
 
 @formula
-def into_planes_beside(normals, index, first, size, P, lane):
+def into_planes_beside(normals, index, first, size, is_even, P, lane):
     """`_into_planes` where those of a row of the block follow each other."""
-    _into_planes(normals, index, first, size, P, lane, beside)
+    _into_planes(normals, index, first, size, is_even, P, lane, beside)
 
 
 @step()
