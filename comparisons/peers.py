@@ -403,7 +403,6 @@ SHOWN = (
     "bilinear",
     "cotan-6-voronoi",
     "jet",
-    "jet-auto",
     "libigl Bunge",
     "libigl principal, radius 2",
     "CGAL jet 4, 2 rings",

@@ -27,7 +27,7 @@ def disagreement(
         As for :func:`quadcurv.mean_curvature`.
     reference : str, Scheme or Fit
         A scheme whose own error is small beside that of `scheme`: of a higher order on a smooth mesh, or
-        consistent on an irregular one; ``quadcurv.schemes.jet("auto")`` on a noisy one.
+        consistent on an irregular or a noisy one.
 
     Returns
     -------

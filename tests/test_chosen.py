@@ -206,7 +206,7 @@ def test_noise_is_no_feature(noise):
 def test_intervals_cover(name, n, noise):
     mesh, exact = noisy(name, n, noise)
     found = qc.curvatures(mesh)
-    assert 0.92 < np.mean(np.abs(found.mean - exact[0]) <= found.interval.mean) < 0.985
+    assert 0.92 < np.mean(np.abs(found.mean - exact[0]) <= found.interval.mean) < 0.997
 
 
 @pytest.mark.parametrize(
@@ -224,16 +224,16 @@ def test_the_error_of_plain_fits_is_known(name, layout, n, jitter):
 def test_noise_is_averaged():
     mesh, (H, *_) = noisy("cubed_ellipsoid", 24, 1e-2)
     error, plain = (np.abs(qc.mean_curvature(mesh, s) - H).mean() for s in ("jet", jet(4)))
-    assert error < plain / 3
+    assert error < plain / 10
     found = qc.curvatures(mesh)
-    assert np.mean(found.degree == 4) > 0.9
+    assert np.mean(found.rings > 3) > 0.9
 
 
-@pytest.mark.parametrize(("noise", "bound"), [(1e-3, 2.5e-3), (1e-2, 1e-2), (5e-2, 3e-2), (0.3, 0.12)])
+@pytest.mark.parametrize(("noise", "bound"), [(1e-3, 1.5e-3), (1e-2, 6e-3), (5e-2, 1.8e-2), (0.3, 0.1)])
 def test_more_rings_where_noise_prevails(noise, bound):
     """Vertex by vertex, with intervals that hold."""
     mesh, (H, *_) = noisy("cubed_ellipsoid", 24, noise)
-    found = qc.curvatures(mesh, "jet-auto")
+    found = qc.curvatures(mesh)
     error = np.abs(found.mean - H)
     assert error.mean() < bound
     assert np.mean(error <= found.interval.mean) > 0.92

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -141,8 +142,9 @@ def test_other_fits_of_other_reach(small):
         whole = qc.mean_curvature(qc.QuadGrid(x, (False, True)), scheme)
         blocks = qc.mean_curvature(qc.ChunkedGrid(x, (False, True)), scheme)
         np.testing.assert_allclose(whole, blocks, rtol=0, atol=1e-12)
-    with pytest.raises(ValueError, match="jet-auto looks at all of a grid at once"):
-        qc.mean_curvature(qc.ChunkedGrid(x), "jet-auto")
+    everywhere = replace(qc.schemes.jet(4), name="everywhere", reach=None)
+    with pytest.raises(ValueError, match="everywhere looks at all of a grid at once"):
+        qc.mean_curvature(qc.ChunkedGrid(x), everywhere)
 
 
 @pytest.mark.parametrize("scheme", [name for name in qc.SCHEMES if not name.startswith("jet")])

@@ -130,11 +130,11 @@ def test_the_median_counts_an_operator_once():
     found = by_hand(families, a=[1] * 4, b=[np.nan, 3, 3, 3], c=[3, np.nan, 3, 3], d=[9] * 4).consensus
     assert found.tolist() == [[3, 3]] * 2
     mesh = surfaces.cubed_ellipsoid().sample((5, 5), "faces")[0]
-    result = compare(mesh, ["liu", "jet", "jet-auto", "finite_volume"])
-    assert result.families["jet"] == result.families["jet-auto"]
+    result = compare(mesh, ["liu", "jet", "jet-2", "finite_volume"])
+    assert result.families["jet"] == result.families["jet-2"]
     assert len(set(result.families.values())) == 3
     H = [result.mean_curvature[name] for name in ("liu", "finite_volume")]
-    jets = [result.mean_curvature[name] for name in ("jet", "jet-auto")]
+    jets = [result.mean_curvature[name] for name in ("jet", "jet-2")]
     expected = np.median([*H, *H, *jets], axis=0)  # each of the jets has half a vote
     assert result.consensus == pytest.approx(expected, abs=1e-12)
 

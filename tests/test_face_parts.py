@@ -427,8 +427,6 @@ def test_what_is_refused(tmp_path):
     with pytest.raises(qc.MeshError, match="is not empty"):
         made(folder="c")
     parts = made(folder="e", parts=4)
-    with pytest.raises(ValueError, match="jet-auto chooses for a mesh as a whole"):
-        qc.evaluate(parts, "k1", scheme="jet-auto")
     with pytest.raises(ValueError, match="wanted: expected some of"):
         qc.evaluate(parts, "k1", scheme="liu")
     with pytest.raises(ValueError, match="out: mean_curvature wants an array of floats of shape"):

@@ -672,17 +672,14 @@ CHOICES = [(2, 1), *((d, r) for d in (2, 3, 4) for r in range(2, 9))]
 
 @pytest.mark.parametrize("noise", [0, 1e-4, 1e-3, 1e-2, 5e-2])
 @pytest.mark.parametrize(("name", "n"), [("torus", 64), ("cubed_ellipsoid", 24), ("catenoid", 48)])
-def test_auto_beside_the_best_choice_for_the_whole_mesh(name, n, noise):
+def test_the_default_beside_the_best_choice_for_the_whole_mesh(name, n, noise):
     mesh, (H, *_) = noisy(name, n, noise)
 
     def error(scheme):
         return np.nanmean(np.abs(qc.mean_curvature(mesh, scheme) - H))
 
-    auto = error(jet("auto"))
     # At borders nothing is mirrored, which some of the others gain by.
-    assert auto < (2.5 if name == "catenoid" else 1.2) * min(error(jet(*choice)) for choice in CHOICES)
-    if noise == 0:
-        assert auto == error("jet")
+    assert error("jet") < (2.5 if name == "catenoid" else 1.2) * min(error(jet(*c)) for c in CHOICES)
 
 
 @pytest.mark.parametrize(
@@ -694,13 +691,13 @@ def test_auto_beside_the_best_choice_for_the_whole_mesh(name, n, noise):
         ("enneper", 40, 1e-3, 20),
     ],
 )
-def test_auto_where_the_bias_is_hard_to_see(name, n, noise, seed):
+def test_the_default_where_the_bias_is_hard_to_see(name, n, noise, seed):
     mesh, (H, *_) = noisy(name, n, noise, seed)
 
     def error(scheme):
         return np.mean(np.abs(qc.mean_curvature(mesh, scheme) - H))
 
-    assert error(jet("auto")) < 1.8 * min(error(jet(*choice)) for choice in CHOICES)
+    assert error("jet") < 2 * min(error(jet(*choice)) for choice in CHOICES)
 
 
 # ---- what is asked for wrongly --------------------------------------------------------------------------
@@ -708,11 +705,11 @@ def test_auto_where_the_bias_is_hard_to_see(name, n, noise, seed):
 
 def test_rejections():
     for arguments, match in (
-        ((5,), 'degree: expected "auto" or one of'),
+        ((5,), "degree: expected one of"),
         (("best",), "degree: expected"),
         ((2, 0), "rings: expected a whole number"),
         ((2, 1.5), "rings: expected a whole number"),
-        (("auto", 2), "rings: chosen with degree"),
+        ((None, 2), "rings: chosen vertex by vertex"),
     ):
         with pytest.raises(ValueError, match=match):
             jet(*arguments)

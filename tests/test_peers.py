@@ -175,7 +175,7 @@ def test_who_has_no_values_does_not_count():
 def test_jets_are_best_where_grids_are_not_smooth():
     """Jittered torus: only fits converge, and the jet has a third of the Laplacians' errors at least."""
     case = cases.ring().jittered(cases.ring_grid(96, 48).mesh, 0.2)
-    chosen = [m for m in ALL.values() if not m.missing and m.library != "CGAL" and m.name != "jet-auto"]
+    chosen = [m for m in ALL.values() if not m.missing and m.library != "CGAL"]
     found = {m.name: peers.error(peers.measured(m, case), "H") for m in chosen if m.name != "trimesh"}
     best = found.pop("jet")
     assert best < 1.5e-3
@@ -183,13 +183,12 @@ def test_jets_are_best_where_grids_are_not_smooth():
     assert np.nanmin(list(others.values())) > 3 * best
 
 
-def test_noise_wants_the_automatic_fit():
+def test_noise_is_averaged():
     case = peers.MESHES["noise 5e-2"][1](16)
     found = {
-        name: peers.error(peers.measured(ALL[name], case), "H")
-        for name in ("finite_volume", "liu", "jet", "jet-auto")
+        name: peers.error(peers.measured(ALL[name], case), "H") for name in ("finite_volume", "liu", "jet")
     }
-    assert found["jet-auto"] < 0.4 * min(found["finite_volume"], found["liu"])
+    assert found["jet"] < 0.2 * min(found["finite_volume"], found["liu"])
 
 
 def test_records_table_and_figure(tmp_path):

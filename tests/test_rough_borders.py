@@ -401,7 +401,7 @@ def test_borders_magnify_noise_no_more_than_the_inside(amount):
     assert error[[0, 0, -1, -1], [0, -1, 0, -1]].max() < 10 * inside
 
 
-@pytest.mark.parametrize("scheme", ["jet", "jet-2", "jet-auto"])
+@pytest.mark.parametrize("scheme", ["jet", "jet-2"])
 @pytest.mark.parametrize("rows", [5, 6, 7])
 def test_fits_on_narrow_grids_have_values(scheme, rows):
     points = surfaces.torus().sample((14, 14))[0].points[:rows]

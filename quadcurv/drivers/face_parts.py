@@ -41,8 +41,6 @@ def evaluate(
     checked_boundary(boundary)
     if out is not None and not isinstance(out, Mapping):
         raise ValueError(f"out: expected a mapping from names to arrays, got {type(out).__name__}")
-    if isinstance(scheme, Fit) and scheme.name == "jet-auto":
-        raise ValueError("scheme: jet-auto chooses for a mesh as a whole, which parts do not see")
     results = _arrays(mesh, wanted, scheme, {} if out is None else out)
     try:
         said = _by_parts(mesh, scheme, boundary, results, progress)
@@ -135,7 +133,8 @@ def part_results(mesh: FaceParts, p: int, job: _Job, alone: bool = False) -> Ans
     wanted, scheme, boundary, origin = job
     is_fit = isinstance(scheme, Fit)
     try:
-        part = mesh.part(p, _FIT_RINGS if is_fit else _RINGS, is_fit, origin)
+        rings = max(_FIT_RINGS, (scheme.reach or 0) + REACH) if isinstance(scheme, Fit) else _RINGS
+        part = mesh.part(p, rings, is_fit, origin)
     except MeshError as error:
         raise MeshError(f"part {p}, vertices {mesh.cuts[p]}..{mesh.cuts[p + 1] - 1}: {error}") from None
     owned = mesh.owned(p)

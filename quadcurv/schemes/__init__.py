@@ -47,7 +47,6 @@ SCHEMES: dict[str, Scheme] = {
         alexa_wardetzky(),
         jet(2),
         jet(),
-        jet("auto"),
     )
 }
 
@@ -67,7 +66,6 @@ SchemeName = Literal[
     "alexa_wardetzky",
     "jet-2",
     "jet",
-    "jet-auto",
     "angle_defect",
 ]
 """Names that the verbs take, for completion in editors."""

@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 from scipy.special import stdtrit
 
+from quadcurv.schemes import averaged
 from quadcurv.schemes.base import Curvatures, Neighbourhoods, StandardErrors
 from quadcurv.types import Bools, Floats, Indices
 
@@ -23,9 +24,6 @@ _LAST = (1, 2, 3, 4)  # rings of quadratic fits
 # Most that errors in height, of unit mean square, may grow to in the second derivatives, both in units of
 # the neighbourhood's extent; regular neighbourhoods have 40, 16 and 4.
 _CONDITION = {6: 500.0, 4: 160.0, 2: 40.0}
-# The same of plain least squares: regular neighbourhoods have 30 to 40, those without two rows 400 to 600, of
-# which nothing is left but noise.
-_PLAIN = {6: 160.0, 4: 160.0, 2: 40.0}
 # The same of one-sided fits; over fewer rows than one more than the degree what they leave out is not seen.
 _ONE_SIDED = {(6, 3): 2e3, (6, 4): 2e3, (6, 5): 1e4, (4, 2): 1e3, (4, 3): 1e3, (4, 4): 1e3}
 # What noise leaves of its square in weighted residuals, and their degrees of freedom, both per point more
@@ -35,17 +33,14 @@ _LEFT = {6: (0.41, 0.67), 4: (0.31, 0.62), 2: (0.06, 0.57)}
 _DIGITS = 2.0**-46
 # Times what noise explains with as many terms, from which on terms are the surface's.
 _RESOLVED = 5.0
-# Where noise prevails: degrees and rings if three do not do, and rings of quartics that are tried on.
-_MORE = ((4, 4), (4, 5), (2, 3), (2, 4))
-_RINGS = (4, 6, 8, 11)
-_POOL, _PART = 30, 0.6
-_CHANCE = 0.2  # of the noise's square, that means over two rings of neighbours may be off
+# Where noise prevails of which nobody near knows how large it is.
+_MORE = ((4, 3), (4, 4), (4, 5), (2, 3), (2, 4))
 _QUANTILE = 0.975
 _SMALLER = ((4, 2), (2, 1))
 _DOUBT = 0.02  # of the curvature, from which errors on others are asked
 _NEARLY_ALL, _MOST = 0.8, 0.5
 _FAR = 12  # rings over which noise is looked for at most, where all is steep
-POOLED = _FAR
+POOLED = _FAR + averaged.POOLED
 # Fits over five rings at these, the normals of the rings, and how far creases and jumps are looked for.
 REACH = POOLED + 5 + 1 + 6
 
@@ -96,12 +91,11 @@ class _Found:
         others = np.reshape(beyond, (-1, 1)) * gain / gain[:, :1]
         self.bias[at] = np.hypot(fits[:, kernel.BIAS : kernel.BIAS + 4], others)
 
-    def put_noisy(self, at: Indices, fits: Floats, d: int, r: Any, bias: Floats) -> None:
-        """Results of fits by plain least squares."""
-        kernel = self.kernel
+    def put_noisy(self, at: Indices, fits: Floats, d: int, r: int, noise: Floats, bias: Any) -> None:
+        """Results of fits by plain least squares, and their bias."""
         self.values[at], self.degree[at], self.rings[at] = fits, d, r
-        self.sigma[at], self.freedom[at] = fits[:, kernel.SIGMA], np.maximum(fits[:, kernel.FREEDOM], 1.0)
-        self.bias[at] = bias[:, None] * fits[:, kernel.GAIN : kernel.GAIN + 4] / fits[:, kernel.GAIN, None]
+        self.sigma[at], self.freedom[at] = noise, np.maximum(fits[:, self.kernel.FREEDOM], 1.0)
+        self.bias[at] = bias
 
     def clear(self, at: Indices) -> None:
         """Nothing is known again."""
@@ -115,6 +109,13 @@ class _Found:
         freedom, places = np.unique(self.freedom[at], return_inverse=True)  # they are few
         noise = stdtrit(freedom, _QUANTILE)[places, None] * gain * self.sigma[at, None]
         return np.hypot(np.nan_to_num(noise), 2 * self.bias[at])
+
+    def doubt(self, at: Indices, rounding: float) -> Floats:
+        """Errors of H over the curvature, 0 where they are rounding."""
+        kernel, values, error = self.kernel, self.values[at], self.errors(at)[:, 0]
+        size = np.maximum(np.abs(values[:, kernel.K1]), np.abs(values[:, kernel.K2]))
+        with np.errstate(divide="ignore", invalid="ignore"):
+            return np.where(error <= rounding * values[:, kernel.GAIN], 0.0, error / size)
 
     def curvatures(self, on_crease: Bools) -> Curvatures:
         """What is known."""
@@ -130,8 +131,8 @@ class _Found:
         )
 
 
-def chosen(around: Neighbourhoods, most: int = 3) -> Curvatures:
-    """All curvatures by the best fit that each vertex can have, over `most` rings where all is noise."""
+def chosen(around: Neighbourhoods) -> Curvatures:
+    """All curvatures by the best fit that each vertex can have."""
     from quadcurv.kernels import jet as kernel
 
     found = _Found(around)
@@ -140,7 +141,7 @@ def chosen(around: Neighbourhoods, most: int = 3) -> Curvatures:
     if creased.size:
         here = around.polynomials(creased, 2, 1, False)
         known = here[:, kernel.CONDITION] <= _CONDITION[2]
-        found.put_noisy(creased[known], here[known], 2, 1, np.zeros(known.sum()))
+        found.put_noisy(creased[known], here[known], 2, 1, here[known, kernel.SIGMA], 0.0)
     vertices = np.flatnonzero(around.wanted & ~feature)
     if vertices.size == 0:
         return found.curvatures(around.on_crease)
@@ -151,9 +152,9 @@ def chosen(around: Neighbourhoods, most: int = 3) -> Curvatures:
     found.put(vertices[at], fits[at], 6, 3)
     noisy = np.concatenate((vertices[unresolved], _at_sides(around, vertices[~good], fits[~good], found)))
     if noisy.size:
-        steep = vertices[np.isnan(fits[:, kernel.CONDITION])]
+        steep = vertices[np.isnan(fits[:, kernel.CONDITION]) | (found.degree[vertices] <= 2)]
         noisy = _in_noise(around, vertices, steep, noisy)
-        _average(around, noisy, found, most)
+        _average(around, noisy, found)
     _doubted(around, np.setdiff1d(vertices[good], noisy), found)
     return found.curvatures(around.on_crease)
 
@@ -165,9 +166,7 @@ def _doubted(around: Neighbourhoods, vertices: Indices, found: _Found) -> None:
     """
     from quadcurv.kernels import jet as kernel
 
-    size = np.maximum(np.abs(found.values[vertices, kernel.K1]), np.abs(found.values[vertices, kernel.K2]))
-    least = around.rounding * found.values[vertices, kernel.GAIN]
-    vertices = vertices[found.errors(vertices)[:, 0] > np.maximum(_DOUBT * size, least)]
+    vertices = vertices[found.doubt(vertices, around.rounding) > _DOUBT]
     for d, r in _SMALLER:
         if vertices.size == 0:
             return
@@ -290,106 +289,20 @@ def _resolved(fits: Floats, d: int, rounding: float) -> Bools:
     return exact | (explained > _RESOLVED * terms * fits[:, kernel.SQUARE])
 
 
-def _average(around: Neighbourhoods, vertices: Indices, found: _Found, most: int) -> None:
-    """Take plain least squares at noisy vertices, of degree 4 where that is not biased, else of degree 6."""
+def _average(around: Neighbourhoods, vertices: Indices, found: _Found) -> None:
+    """Take plain least squares at noisy vertices."""
     from quadcurv.kernels import jet as kernel
 
-    high, low = (_round(around, d, 3, vertices) for d in (6, 4))
-    good6, good4 = (_sound(fits, d) for fits, d in ((high, 6), (low, 4)))
-    explained = high[:, kernel.LOWER] - high[:, kernel.SQUARE]
-    squares = np.stack((high[:, kernel.SQUARE], high[:, kernel.FREEDOM], explained), axis=1)
-    squares = np.where(good6[:, None], squares, np.nan)
-    square, freedom, explained = _spread(around, vertices, squares, 2).T
-    noise2 = square / freedom
-    gain6, gain4 = high[:, kernel.GAIN] ** 2, low[:, kernel.GAIN] ** 2
-    bias2 = np.maximum(explained / 13 - (1 + _CHANCE) * noise2, 0.0) * np.maximum(gain6 - gain4, 0.0)
-    bias2 = np.where(np.isnan(bias2), 0.0, bias2)
-    take4 = good4 & ~(good6 & (gain6 * noise2 < gain4 * noise2 + bias2))
-    take6 = good6 & ~take4
-    found.put_noisy(vertices[take4], low[take4], 4, 3, np.sqrt(bias2[take4]))
-    found.put_noisy(vertices[take6], high[take6], 6, 3, np.zeros(take6.sum()))
-    todo = vertices[~take4 & ~take6]
+    left = np.zeros(around.wanted.size, bool)
+    left[vertices] = True
+    for at, fits, d, r, noise2, bias in averaged.least_risks(around, vertices):
+        found.put_noisy(at, fits, d, r, np.sqrt(noise2), bias)
+        left[at] = False
+    todo = np.flatnonzero(left)
     for d, r in _MORE:
         if todo.size == 0:
-            break
-        fits = _round(around, d, r, todo)
-        good = _sound(fits, d)
-        found.put_noisy(todo[good], fits[good], d, r, np.zeros(good.sum()))
-        todo = todo[~good]
-    if most > 3:
-        noise2 = np.where(np.isnan(noise2), _spread(around, vertices, noise2[:, None], 4)[:, 0], noise2)
-        wider = (found.degree[vertices] == 4) & (noise2 > 0)
-        _widen(around, vertices[wider], noise2[wider], found, 4, most)
-        simpler = _simplify(around, vertices[wider], noise2[wider], found)
-        _widen(around, vertices[wider][simpler], noise2[wider][simpler], found, 2, most)
-
-
-def _simplify(around: Neighbourhoods, vertices: Indices, noise2: Floats, found: _Found) -> Bools:
-    """Take quadratics over the same rings where they are not biased: at borders they have far less noise."""
-    from quadcurv.kernels import jet as kernel
-
-    before, rings = found.values[vertices], found.rings[vertices]
-    explained = (before[:, kernel.LOWER] - before[:, kernel.SQUARE]) / 9
-    excess = _spread(around, vertices, np.stack((explained, noise2), axis=1), 2) @ (1, -1 - _CHANCE)
-    fits = np.full_like(before, np.nan)
-    for r in np.unique(rings):
-        at = rings == r
-        fits[at] = _round(around, 2, int(r), vertices[at])
-    gain4, gain2 = before[:, kernel.GAIN] ** 2, fits[:, kernel.GAIN] ** 2
-    own = found.bias[vertices, 0]
-    bias2 = np.maximum(excess, 0.0) * np.maximum(gain4 - gain2, 0.0) + own**2
-    better = _sound(fits, 2) & (gain2 * noise2 + bias2 < gain4 * noise2 + own**2)
-    found.put_noisy(vertices[better], fits[better], 2, rings[better], np.sqrt(bias2[better]))
-    return better
-
-
-def _widen(
-    around: Neighbourhoods, vertices: Indices, noise2: Floats, found: _Found, degree: int, most: int
-) -> None:
-    """Take more rings as long as that lessens noise and bias together.
-
-    Of two such fits, one over some of the points of the other, H of the wider one is the best linear estimate
-    of all if it is not biased, and the difference between them has no part in its noise (Gauss and Markov).
-    What the mean square of the difference has beyond that of the noise is bias (Hausman 1978).
-    """
-    from quadcurv.kernels import jet as kernel
-
-    failed = np.zeros(vertices.size, bool)  # the step before
-    for r in (r for r in _RINGS if r <= most):
-        if vertices.size == 0:
             return
-        fits, before = _round(around, degree, r, vertices), found.values[vertices]
-        good = _sound(fits, degree) & (found.rings[vertices] < r)
-        chance = (before[:, kernel.GAIN] ** 2 - fits[:, kernel.GAIN] ** 2) * noise2
-        both = np.stack(((fits[:, kernel.MEAN] - before[:, kernel.MEAN]) ** 2, chance), axis=1)
-        square, chance = _spread(around, vertices, np.where(good[:, None], both, np.nan), _POOL).T
-        own = found.bias[vertices, 0]
-        bias = np.sqrt(np.maximum(square - (1 + _PART) * chance, 0.0)) + own
-        risk = fits[:, kernel.GAIN] ** 2 * noise2 + bias**2
-        better = good & (risk < before[:, kernel.GAIN] ** 2 * noise2 + own**2)
-        known = np.hypot(np.sqrt(np.maximum(square - chance, 0.0)), own)
-        found.put_noisy(vertices[better], fits[better], degree, r, known[better])
-        kept = better | (found.rings[vertices] >= r) | (good & ~failed)
-        vertices, noise2, failed = vertices[kept], noise2[kept], (good & ~better)[kept]
-
-
-def _round(around: Neighbourhoods, d: int, r: int, at: Indices) -> Floats:
-    from quadcurv.kernels import jet as kernel
-
-    return around.polynomials(at, d, r, ghosts=False, kind=kernel.ROUND)
-
-
-def _sound(fits: Floats, d: int) -> Bools:
-    """Whether a fit is well conditioned, and has residuals."""
-    from quadcurv.kernels import jet as kernel
-
-    return (fits[:, kernel.CONDITION] <= _PLAIN[d]) & (fits[:, kernel.FREEDOM] > 0)
-
-
-def _spread(around: Neighbourhoods, vertices: Indices, values: Floats, rings: int) -> Floats:
-    """Means over neighbours among some vertices."""
-    whole = np.full((around.wanted.size, values.shape[1]), np.nan)
-    whole[vertices] = values
-    for _ in range(rings):
-        whole = around.pooled(whole)
-    return whole[vertices]
+        fits = averaged.rounded(around, d, r, todo)
+        good = averaged.sound(fits, d)
+        found.put_noisy(todo[good], fits[good], d, r, fits[good, kernel.SIGMA], 0.0)
+        todo = todo[~good]

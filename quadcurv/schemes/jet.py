@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Literal
 
 import numpy as np
 
@@ -24,18 +23,17 @@ _REFERENCE = "Cazals and Pouget 2005"
 Run = Callable[[Indices, int, int], Floats]
 
 
-def jet(degree: int | Literal["auto"] | None = None, rings: int | None = None) -> Fit:
+def jet(degree: int | None = None, rings: int | None = None) -> Fit:
     """Polynomial of height over the tangent plane, by least squares over rings of neighbours.
 
     Parameters
     ----------
-    degree : {2, 3, 4, 6} or "auto", optional
+    degree : {2, 3, 4, 6}, optional
         By default ("jet") chosen vertex by vertex, with rings and weights: where the surface is resolved a
         polynomial of degree 6 over three rings and over the nearest sphere instead of the plane, through the
         vertex and with weights that fall with the distance; where noise prevails plain least squares of
-        degree 4 or 6 over three rings; beside rough borders one-sided fits over more. "auto" goes on where
-        noise prevails, over up to 11 rings, as long as that lessens noise and bias together, the one by its
-        residuals and the other by differences between fits, both averaged over neighbours.
+        degree 6, 4 or 2 over three to eight rings, those of the least noise and bias together, both estimated
+        from residuals of neighbours; beside rough borders one-sided fits over more.
     rings : int, optional
         Rings of faces around a vertex whose vertices are fitted, on a grid the window of
         (2 rings + 1)^2 points. By default 1 for degree 2, 3 for degree 6 and 2 for the others.
@@ -60,7 +58,7 @@ def jet(degree: int | Literal["auto"] | None = None, rings: int | None = None) -
     Raises
     ------
     ValueError
-        Any other degree, fewer than one ring, or rings with "auto".
+        Any other degree, fewer than one ring, or rings without a degree.
 
     References
     ----------
@@ -80,12 +78,8 @@ def jet(degree: int | Literal["auto"] | None = None, rings: int | None = None) -
         if rings is not None:
             raise ValueError(f"rings: chosen vertex by vertex without a degree, got {rings!r}")
         return Fit("jet", 6, _REFERENCE, chosen, REACH, POOLED)
-    if degree == "auto":
-        if rings is not None:
-            raise ValueError(f'rings: chosen with degree "auto", got {rings!r}')
-        return Fit("jet-auto", 6, _REFERENCE, lambda around: chosen(around, _MOST_RINGS))
     if not isinstance(degree, int) or degree not in _CONDITION:
-        raise ValueError(f'degree: expected "auto" or one of {tuple(_CONDITION)}, got {degree!r}')
+        raise ValueError(f"degree: expected one of {tuple(_CONDITION)}, got {degree!r}")
     if rings is None:
         rings = _RINGS[degree]
     elif not isinstance(rings, int | np.integer) or not 1 <= rings <= _MOST_RINGS:

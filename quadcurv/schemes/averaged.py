@@ -1,0 +1,154 @@
+"""Degree and rings of plain least squares where noise prevails, chosen vertex by vertex by their risk.
+
+The risk of a fit is the square of what noise makes of its H and that of its bias. Noise is known from the
+residuals of fits that are small enough to follow the surface. The bias of a degree is told by the two next
+ones: what they explain of the same points beyond what they would explain of noise counts as if every one of
+their terms had the same part in it, and made as much of H. That of degree 6 is told by what its residuals
+have beyond noise.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from quadcurv.schemes.base import Neighbourhoods
+from quadcurv.types import Bools, Floats, Indices
+
+# Rings, and those that follow where degree 6 is best and where a lower one is.
+_FOLLOWING = {3: (4, 5), 4: (5, 5), 5: (6, 8), 6: (8, 8), 8: (0, 0)}
+_NOISE, _POOL = 3, 1  # rings of neighbours whose residuals tell of noise, and whose terms of bias
+POOLED = _NOISE + _POOL * len(_FOLLOWING)
+_WORSE = 2.0  # times the least risk so far, from which on no more rings are taken
+# Most that errors in height, of unit mean square, may grow to in the second derivatives, both in units of
+# the neighbourhood's extent: regular neighbourhoods have 30 to 40, those without two rows 400 to 600, of
+# which nothing is left but noise.
+_CONDITION = {6: 160.0, 4: 160.0, 2: 40.0}
+_TERMS = {8: 17, 6: 13, 4: 9}  # of a degree and the one before it
+_MORE = {4: 7.0, 2: 12.0}  # the same, less its own, by any two degrees more, where there is no such fit
+_ONE_SIDED = 4.0  # times that at most where such a fit is one-sided
+_NEXT = 3.0  # times the square of what noise grows to by degree 6, by degree 8
+# Shares of the noise's square: what terms may be off by chance, and what noise may grow by with every ring.
+_CHANCE, _UNEVEN = 0.2, 0.02
+# Times the bias as it seems that of H, K, k1 and k2 is taken for in intervals: terms that are alike round the
+# vertex, as on humps, give H more than others, and principal curvatures more still.
+_CAUTION = np.array((1.2, 1.2, 1.9, 1.9))
+# Times its square that of bias counts in the risk: it is known less well than noise.
+_DOUBT = 2.0
+_ALIKE = 5.0  # vertices whose residuals are one another's
+
+
+class Candidate:
+    """A fit that vertices could have: results, squares of its bias as it seems and in intervals, its risk."""
+
+    def __init__(self, fits: Floats, degree: int, bias2: Floats, most2: Floats, noise2: Floats) -> None:
+        from quadcurv.kernels import jet as kernel
+
+        self.fits, self.degree, self.bias2, self.most2 = fits, degree, bias2, most2
+        self.gain2 = fits[:, kernel.GAIN] ** 2
+        self.good = sound(fits, degree)
+        risk = self.gain2 * noise2 + _DOUBT * bias2
+        self.risk = np.where(self.good & ~np.isnan(risk), risk, np.inf)
+
+
+def least_risks(
+    around: Neighbourhoods, vertices: Indices
+) -> Iterator[tuple[Indices, Floats, int, int, Floats, Floats]]:
+    """Fits that are better than those before: vertices, results, degree, rings, noise, biases.
+
+    Noise is the variance of the positions along the normal, biases (k, 4) are those of H, K, k1 and k2.
+    """
+    from quadcurv.kernels import jet as kernel
+
+    following, least = np.full(vertices.size, min(_FOLLOWING)), np.full(vertices.size, np.inf)
+    noise2, values, gains2 = np.empty(0), *np.full((2, vertices.size, 4), np.nan)
+    for r, (even, lower) in _FOLLOWING.items():
+        at = np.flatnonzero(following == r)
+        if at.size == 0:
+            continue
+        six = rounded(around, 6, r, vertices[at])
+        if noise2.size == 0:  # all have begun
+            of = np.where(sound(six, 6)[:, None], six[:, [kernel.SQUARE, kernel.FREEDOM]], np.nan)
+            square, freedom = spread(around, vertices, of, _NOISE).T
+            noise2 = square / freedom
+        candidates = list(_candidates(around, vertices[at], r, noise2[at], six))
+        risks = np.stack([c.risk for c in candidates])
+        best, risk = np.argmin(risks, axis=0), np.min(risks, axis=0)
+        fits, most2 = six.copy(), candidates[0].most2.copy()
+        for k, c in enumerate(candidates):
+            fits[best == k], most2[best == k] = c.fits[best == k], c.most2[best == k]
+        # What the difference to the fit before has beyond noise is bias (Hausman 1978).
+        new, gain2 = fits[:, :4], fits[:, kernel.GAIN : kernel.GAIN + 4] ** 2
+        beyond = (new - values[at]) ** 2 - np.maximum(gains2[at] - gain2, 0.0) * noise2[at, None]
+        better = risk < least[at]
+        beyond = spread(around, vertices[at], np.where(better[:, None], beyond, np.nan), _POOL)
+        bias2 = np.fmax(most2[:, None] * gain2 / gain2[:, :1] * _CAUTION**2, beyond)
+        bias = np.sqrt(np.fmax(bias2, 0.0))
+        for k, c in enumerate(candidates):
+            now = (best == k) & better
+            yield vertices[at[now]], fits[now], c.degree, r, noise2[at[now]], bias[now]
+        on = (risk < _WORSE * least[at]) | np.isinf(least[at])
+        least[at] = np.minimum(risk, least[at])
+        values[at[better]], gains2[at[better]] = new[better], gain2[better]
+        following[at] = np.where(on, np.where(best > 0, lower, even), 0)
+
+
+def _candidates(
+    around: Neighbourhoods, vertices: Indices, r: int, noise2: Floats, six: Floats
+) -> Iterator[Candidate]:
+    """Degrees 6, 4 and 2 over so many rings, the lower ones where the bias permits them."""
+    from quadcurv.kernels import jet as kernel
+
+    excess = six[:, kernel.SQUARE] - six[:, kernel.FREEDOM] * noise2
+    of = np.where(sound(six, 6)[:, None], np.stack((excess, six[:, kernel.FREEDOM]), axis=1), np.nan)
+    excess, freedom = np.nan_to_num(spread(around, vertices, of, _POOL)).T
+    chance = noise2 * np.sqrt(freedom / _ALIKE)
+    share = _NEXT / _TERMS[8] * six[:, kernel.GAIN] ** 2
+    uneven = _UNEVEN * (r - min(_FOLLOWING)) * noise2 * freedom
+    seen, most = (np.maximum(x, 0.0) * share for x in (excess - uneven - chance, excess))
+    before = Candidate(six, 6, seen, most, noise2)
+    yield before
+    risk, some = before.risk, np.ones(vertices.size, bool)
+    for degree in (4, 2):
+        terms = _TERMS[degree + 2]
+        explained = before.fits[:, kernel.LOWER] - before.fits[:, kernel.SQUARE]
+        explained = np.where(before.good, explained, np.nan)[:, None]
+        per_term = spread(around, vertices, explained, _POOL)[:, 0] / terms
+        excess = np.maximum(per_term - (1 + _CHANCE) * noise2, 0.0)
+        # Of what noise grows to with more terms these leave no more than a fifth.
+        better = (excess * 0.8 * before.gain2 < before.risk) & (before.risk <= risk)
+        some &= np.isinf(before.risk) | better
+        fits = np.full_like(six, np.nan)
+        fits[some] = rounded(around, degree, r, vertices[some])
+        gain2 = fits[:, kernel.GAIN] ** 2
+        most = _MORE[degree] * gain2
+        less = np.where(before.good, np.clip(before.gain2 - gain2, 0.0, _ONE_SIDED * most), most)
+        seen = excess * less + np.nan_to_num(before.bias2)
+        most = np.maximum(per_term - noise2, 0.0) * less + np.nan_to_num(before.most2 * gain2 / before.gain2)
+        risk = np.minimum(risk, before.risk)
+        before = Candidate(fits, degree, seen, most, noise2)
+        yield before
+
+
+def rounded(around: Neighbourhoods, degree: int, rings: int, vertices: Indices) -> Floats:
+    """Plain least squares over the nearest sphere."""
+    from quadcurv.kernels import jet as kernel
+
+    return around.polynomials(vertices, degree, rings, ghosts=False, kind=kernel.ROUND)
+
+
+def sound(fits: Floats, degree: int) -> Bools:
+    """Whether a fit is well conditioned, and has residuals."""
+    from quadcurv.kernels import jet as kernel
+
+    return (fits[:, kernel.CONDITION] <= _CONDITION[degree]) & (fits[:, kernel.FREEDOM] > 0)
+
+
+def spread(around: Neighbourhoods, vertices: Indices, values: Floats, rings: int) -> Floats:
+    """Means over neighbours among some vertices."""
+    whole = np.full((around.wanted.size, values.shape[1]), np.nan)
+    whole[vertices] = values
+    for _ in range(rings):
+        whole = around.pooled(whole)
+    return whole[vertices]
