@@ -12,7 +12,7 @@ from quadcurv.types import Bools, Floats, Indices, Ints
 # Least angle of a crease, in radians, and times the angles next to it.
 _LEAST, _TIMES = np.radians(4.0), 4.0
 # Least step of curvature at a jump: times those beside it, as a share of the curvature, and as an angle.
-_STEP, _SHARE, _TURN = 10.0, 0.5, 1e-3
+_STEP, _SHARE, _TURN = 7.0, 0.5, 1e-3
 _MILD = np.radians(45.0)  # most that a tangent turns there
 # Where a strip turns it meets another of the surface's curvatures: a change by at most so many times the
 # largest one around and the sine of its kink (2 of all directions, of which strips show two); from so large

@@ -109,8 +109,11 @@ class MeshNeighbourhoods:
         """
         return self._border.setdefault(rings, np.full((2, self.stencils.n), np.nan))
 
-    def positions(self, vertices: Indices, rings: int) -> tuple[Floats, Floats]:
+    def positions(self, vertices: Indices, rings: int, ghosts: bool = True) -> tuple[Floats, Floats]:
         """(k, m, 3) and (k, 3): see `Neighbourhoods`."""
+        if not ghosts:
+            own = self._sides if bool((self.on_crease | self.on_jump).any()) else self._faces
+            return own.positions(vertices, rings), own.normals[vertices]
         out, normals = self._faces.positions(vertices, rings), self._faces.normals[vertices]
         for faces, place, reach, error in (*self._beyond(rings), *self._at_poles(rings)):
             at = place[vertices]

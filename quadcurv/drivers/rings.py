@@ -153,11 +153,12 @@ class FaceRings:
     def positions(self, vertices: Indices, rings: int) -> Floats:
         """(k, m, 3): see `Neighbourhoods`."""
         incidence, k = self._incidence, vertices.size
+        onward = incidence.multiply(np.diff(self.corners[0]) > 0).tocsr().T  # not through those left out
         around = scipy.sparse.csr_array(
             (np.ones(k, bool), vertices, np.arange(k + 1)), (k, len(self.stencils.points))
         )
         for _ in range(rings):
-            around = around + around @ incidence.T @ incidence
+            around = around + around @ onward @ incidence
         around.sort_indices()
         row, column = around.nonzero()
         other = column != vertices[row]

@@ -236,14 +236,14 @@ class Neighbourhoods(Protocol):
     def pooled(self, values: Floats) -> Floats:
         """Means of values (n, k) over vertices and their neighbours, of those that are known."""
 
-    def positions(self, vertices: Indices, rings: int) -> tuple[Floats, Floats]:
+    def positions(self, vertices: Indices, rings: int, ghosts: bool = True) -> tuple[Floats, Floats]:
         """Positions around vertices (k,), for fits written in numpy.
 
         Returns
         -------
         positions : (k, m, 3) float64
-            The vertex itself, then those of `rings` rings of faces around it, ghosts beyond smooth
-            borders among them; NaN behind.
+            The vertex itself, then those of `rings` rings of faces around it, with `ghosts` those beyond
+            smooth borders among them, else what lies on the vertex's own side of creases; NaN behind.
         normals : (k, 3) float64
             Normals of the rings of faces, of any length.
         """

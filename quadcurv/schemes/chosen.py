@@ -16,6 +16,7 @@ from scipy.special import stdtrit
 
 from quadcurv.schemes import averaged
 from quadcurv.schemes.base import Curvatures, Neighbourhoods, StandardErrors
+from quadcurv.schemes.quadric import quadrics
 from quadcurv.types import Bools, Floats, Indices
 
 # Degree, rings, and whether these go on beyond the border.
@@ -37,6 +38,7 @@ _RESOLVED = 5.0
 _MORE = ((4, 3), (4, 4), (4, 5), (2, 3), (2, 4))
 _QUANTILE = 0.975
 _SMALLER = ((4, 2), (2, 1))
+_EXACT = 1e-3  # of the residuals of quadratic fits: all lie on one quadric
 _DOUBT = 0.02  # of the curvature, from which errors on others are asked
 _NEARLY_ALL, _MOST = 0.8, 0.5
 _FAR = 12  # rings over which noise is looked for at most, where all is steep
@@ -156,6 +158,8 @@ def chosen(around: Neighbourhoods) -> Curvatures:
         noisy = _in_noise(around, vertices, steep, noisy)
         _average(around, noisy, found)
     _doubted(around, np.setdiff1d(vertices[good], noisy), found)
+    doubted = ~(found.doubt(vertices, around.rounding) <= np.where(good, _DOUBT, 0.0))
+    _quadrics(around, np.setdiff1d(vertices[doubted], noisy), found)
     return found.curvatures(around.on_crease)
 
 
@@ -175,6 +179,21 @@ def _doubted(around: Neighbourhoods, vertices: Indices, found: _Found) -> None:
         better = other.errors(vertices)[:, 0] < found.errors(vertices)[:, 0]
         better &= fits[:, kernel.CONDITION] <= _CONDITION[d]
         found.put(vertices[better], fits[better], d, r)
+
+
+def _quadrics(around: Neighbourhoods, vertices: Indices, found: _Found) -> None:
+    """Take the quadric that all of three rings lie on, where there is one.
+
+    What is between it and what was found before is how far either may be off, as over few rows, through which
+    more than one surface goes.
+    """
+    kernel = found.kernel
+    fits = quadrics(around, vertices, 3)
+    least = (around.rounding**2 * fits[:, kernel.FREEDOM], _EXACT**2 * fits[:, kernel.LOWER])
+    exact = fits[:, kernel.SQUARE] <= np.maximum(*least)
+    at, fits = vertices[exact], fits[exact]
+    apart = np.nan_to_num(np.abs(fits[:, :4] - found.values[at, :4])) / 2
+    found.put_noisy(at, fits, 2, 3, fits[:, kernel.SIGMA], apart)
 
 
 def _in_noise(around: Neighbourhoods, vertices: Indices, steep: Indices, noisy: Indices) -> Indices:
