@@ -269,20 +269,63 @@ def coarse() -> dict[str, Case]:
 def low_poly(scheme: str) -> Iterator[tuple[str, float, float, float]]:
     """Share of vertices without a value; mean errors of H by the fit and by the best peer, in hindsight."""
     meshes = coarse()
-    for (name, case), best in zip(meshes.items(), hindsight(list(meshes.values())), strict=True):
+    for (name, case), (best,) in zip(meshes.items(), hindsight(list(meshes.values())), strict=True):
         H = fit(case, scheme).mean
         yield name, float(np.isnan(H).mean()), float(np.nanmean(np.abs(H - case.H))), best
 
 
 def noise_errors(scheme: str) -> Iterator[tuple[str, float, float]]:
-    """Mean errors of H under noise by the fit and by the best peer at its best setting, in hindsight."""
+    """Mean errors under noise by the fit and by the best peer at its best setting, in hindsight.
+
+    Of H, of K, and of k1 and k2 together.
+    """
     meshes = {
         f"{surface}, noise {level:g}": smooth.noisy(level)
         for surface, smooth in surfaces().items()
         for level in (1e-3, 1e-2, 5e-2, 0.3)
     }
-    for (name, case), best in zip(meshes.items(), hindsight(list(meshes.values())), strict=True):
-        yield name, _average(fit(case, scheme).mean, case.H, np.isfinite(case.H)), best
+    bests = hindsight(list(meshes.values()), ("H", "K", "k"))
+    for (name, case), best in zip(meshes.items(), bests, strict=True):
+        found, known = fit(case, scheme), np.isfinite(case.H)
+        own = {q: _average(getattr(found, q), true, known) for q, true in exact(case).items()}
+        both = own["mean"], own["gaussian"], (own["k1"] + own["k2"]) / 2
+        for quantity, mine, other in zip(("H", "K", "k1 and k2"), both, best, strict=True):
+            yield f"{quantity}: {name}", mine, other
+
+
+def direction_errors(scheme: str) -> Iterator[tuple[str, float, float]]:
+    """Mean angles, in degrees, that directions of k1 are off: by the fit, and by libigl's best radius.
+
+    Where k1 and k2 differ by a tenth of the larger one at least.
+    """
+    import igl
+
+    dodecahedron = cases.catmull_clark(cases.dodecahedron(), 4)
+    shapes = {
+        "ellipsoid": (cases.ellipsoid(), cases.cubed(24)),
+        "torus": (cases.ring(), cases.ring_grid(64, 32).mesh),
+        "star": (cases.STAR, cases.on(cases.STAR, dodecahedron).mesh),
+    }
+    for name, (surface, mesh) in shapes.items():
+        smooth, true = cases.on(surface, mesh), surface.direction1(np.asarray(mesh.points))
+        jittered = surface.jittered(mesh, 0.2)
+        meshes = {
+            "smooth": (smooth, true),
+            "jitter": (jittered, surface.direction1(np.asarray(jittered.mesh.points))),
+            **{f"noise {level:g}": (smooth.noisy(level), true) for level in (1e-3, 1e-2, 5e-2)},
+        }
+        for kind, (case, direction) in meshes.items():
+            apart = case.k1 - case.k2 > 0.1 * np.maximum(np.abs(case.k1), np.abs(case.k2))
+            points, cut = np.array(case.mesh.points), _triangles(case.mesh)
+            others = [igl.principal_curvature(points, cut, radius)[0] for radius in (2, 3, 5)]
+            own = _off(fit(case, scheme).direction1, direction, apart)
+            yield f"{name}, {kind}", own, min(_off(other, direction, apart) for other in others)
+
+
+def _off(found: Array, true: Array, at: Array) -> float:
+    """Mean angle between lines, in degrees."""
+    cosine = np.abs(np.einsum("ix,ix->i", found, true)) / np.linalg.norm(found, axis=1)
+    return float(np.nanmean(np.rad2deg(np.arccos(np.minimum(cosine, 1)))[at]))
 
 
 def _worst(H: Array, true: Array, at: Array) -> float:
@@ -485,6 +528,14 @@ def noise(scheme: str) -> Part:
     return part
 
 
+def directions(scheme: str) -> Part:
+    """Principal directions."""
+    part = Part()
+    title = "directions of k1, degrees off over libigl's at its best radius"
+    _ratios(part, title, list(direction_errors(scheme)), 1, 0.5)
+    return part
+
+
 def speed(scheme: str) -> Part:
     """Processor time."""
     part = Part()
@@ -500,6 +551,7 @@ PARTS: dict[str, Callable[[str], Part]] = {
     "features": features,
     "few": few,
     "noise": noise,
+    "directions": directions,
     "speed": speed,
 }
 

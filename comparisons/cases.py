@@ -81,12 +81,26 @@ class Quartic:
             x = x - (value / (gradient**2).sum(axis=1))[:, None] * gradient
         return x
 
+    def _hessian(self, x: Array) -> Array:
+        hessian = 8 * x[:, :, None] * x[:, None, :] * self.B
+        hessian[:, range(3), range(3)] += 4 * x**2 @ self.B + 2 * self.q
+        return hessian
+
+    def direction1(self, x: Array) -> Array:
+        """Unit tangents of k1 at points of the surface, either way round."""
+        _, g = self._gradient(x)
+        n = g / np.linalg.norm(g, axis=1)[:, None]
+        across = np.eye(3) - n[:, :, None] * n[:, None, :]
+        # Along the normal far below any curvature.
+        shape = across @ self._hessian(x) @ across
+        shape -= 1e3 * np.abs(shape).max(axis=(1, 2))[:, None, None] * n[:, :, None] * n[:, None, :]
+        return np.linalg.eigh(shape)[1][:, :, 2]
+
     def case(self, mesh: QuadMesh) -> Case:
         """Exact curvature at the vertices of a mesh that lie on the surface."""
-        x, B = np.asarray(mesh.points), self.B
+        x = np.asarray(mesh.points)
         _, g = self._gradient(x)
-        hessian = 8 * x[:, :, None] * x[:, None, :] * B
-        hessian[:, range(3), range(3)] += 4 * x**2 @ B + 2 * self.q
+        hessian = self._hessian(x)
         size = np.linalg.norm(g, axis=1)
         trace = np.trace(hessian, axis1=1, axis2=2)
         H = (size**2 * trace - np.einsum("ni,nij,nj->n", g, hessian, g)) / (2 * size**3)

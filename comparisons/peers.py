@@ -141,11 +141,11 @@ def _surveyed(first: int, name: str, n: int, cost_size: int) -> Iterator[Cost | 
     yield from errors(method, n, max(first - 1, 0))
 
 
-def hindsight(chosen: Sequence[Case], quantity: str = "H") -> list[float]:
-    """Mean error of the best peer on each mesh, of those with values at 99 % of the vertices at least."""
+def hindsight(chosen: Sequence[Case], quantities: Sequence[str] = ("H",)) -> list[list[float]]:
+    """Mean errors of the best peer on each mesh, of those with values at 99 % of the vertices at least."""
     records = surviving(_measured, len(chosen) * len(PEERS), chosen)
     by_mesh = [records[i : i + len(PEERS)] for i in range(0, len(records), len(PEERS))]
-    return [min(error(r, quantity) for r in some if r and complete(r, quantity)) for some in by_mesh]
+    return [[min(error(r, q) for r in some if r and complete(r, q)) for q in quantities] for some in by_mesh]
 
 
 def _measured(first: int, chosen: Sequence[Case]) -> Iterator[Record]:

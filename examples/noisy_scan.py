@@ -3,8 +3,8 @@ A noisy scan, with error bars
 =============================
 
 Noise of size s in the positions makes an error of about s / h² in a curvature, which is soon larger than
-the curvature. "jet-auto" looks at the residuals of its fits, takes as many rings of faces as pay, and says
-how far to trust the result.
+the curvature. "jet", the default, looks at the residuals of its fits, takes as many rings of faces as pay,
+and says how far to trust the result.
 """
 
 import numpy as np
@@ -22,8 +22,8 @@ scan = mesh.with_points(
 )
 
 # %%
-# Operators of one ring pass the noise on, amplified; "jet-auto" averages it out.
-found = qc.compare(scan, ["finite_volume", "jet", "jet-auto"], exact)
+# Operators of one ring pass the noise on, amplified; "jet" averages it out.
+found = qc.compare(scan, ["finite_volume", "jet"], exact)
 maps(found, "mean_curvature")
 
 # %%
@@ -32,7 +32,7 @@ maps(found, "mean_curvature")
 found
 
 # %%
-all_of_it = qc.curvatures(scan, "jet-auto")
+all_of_it = qc.curvatures(scan)
 print(f"noise {np.median(all_of_it.noise):.4f}, as put in {noise:.4f}")
 print("rings", np.unique(all_of_it.rings), f"interval of H ± {np.median(all_of_it.interval.mean):.3f}")
 

@@ -251,7 +251,7 @@ def test_record_of_an_ended_process(monkeypatch):
 
 def test_hindsight_is_the_least_error_of_all_peers():
     chosen = [cases.on(cases.ellipsoid(), cases.cubed(n)) for n in (3, 4)]
-    for case, found in zip(chosen, peers.hindsight(chosen), strict=True):
+    for case, (found,) in zip(chosen, peers.hindsight(chosen), strict=True):
         records = [peers.measured(m, case) for m in libraries.PEERS if not m.missing]
         best = min(peers.error(r, "H") for r in records if peers.complete(r, "H"))
         assert found == pytest.approx(best, rel=0.05)  # APSS differs from call to call

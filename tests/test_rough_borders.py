@@ -434,7 +434,7 @@ def with_a_vertex_in(grid, i, j):
     return np.vstack((mesh.points, mesh.points[quad].mean(axis=0))), faces
 
 
-@pytest.mark.parametrize("scheme", ["finite_volume", "jet-2", "jet", "jet-auto"])
+@pytest.mark.parametrize("scheme", ["finite_volume", "jet-2", "jet"])
 def test_a_corner_is_continued_as_its_sides_are(scheme):
     """A strip too short to be sure of, near a corner, is continued by index as those beside it."""
     grid, _ = damaged("elliptic_paraboloid", 20, "jitter", 0)
@@ -444,17 +444,16 @@ def test_a_corner_is_continued_as_its_sides_are(scheme):
     assert off[:2, -3:].max() < 1e-9
 
 
-@pytest.mark.parametrize("scheme", ["jet", "jet-auto"])
-def test_fits_know_the_border_errors_of_their_own_rings(scheme):
+def test_fits_know_the_border_errors_of_their_own_rings():
     """Three rings would end at a fitted surface, two read good ghosts: the error of the one is not theirs."""
     grid, exact = damaged("catenoid", 20, "jitter", 0)
-    H = qc.mean_curvature(with_a_vertex_in(grid, 4, 4), scheme)
+    H = qc.mean_curvature(with_a_vertex_in(grid, 4, 4), "jet")
     assert np.abs(H[:-1].reshape(grid.shape) - exact)[0].max() < 0.05
 
 
 def test_fits_that_share_neighbourhoods_are_what_they_are_alone():
     mesh = qc.as_mesh(with_a_vertex_in(damaged("catenoid", 20, "jitter", 0.1)[0], 4, 4))
-    for order in (("jet-2", "jet", "jet-auto"), ("jet-auto", "jet", "jet-2")):
+    for order in (("jet-2", "jet"), ("jet", "jet-2")):
         around = MeshNeighbourhoods(mesh, "extrapolate")
         for scheme in order:
             shared = fit_around(around, SCHEMES[scheme])

@@ -42,13 +42,12 @@ Value = Literal[
     "roughness",
 ]
 VALUES: tuple[Value, ...] = get_args(Value)
-_WITH_INTERVALS = ("jet", "jet-auto")
 
 
 def values_of(scheme: str, wanted: Iterable[Value] | None) -> list[Value]:
     """The values wanted, by default all that the scheme has, in the order of VALUES.
 
-    Intervals and creases are known to the jets that choose their degree, which Laplacians take for all but H;
+    Intervals and creases are known to "jet" alone, which Laplacians take for all but H;
     the error of "jet", by which errors are estimated, has no estimate.
 
     Raises
@@ -58,7 +57,7 @@ def values_of(scheme: str, wanted: Iterable[Value] | None) -> list[Value]:
     """
     chosen = as_scheme(scheme)
     without: set[str] = set()
-    if isinstance(chosen, Fit) and chosen.name not in _WITH_INTERVALS:
+    if isinstance(chosen, Fit) and chosen.name != jet().name:
         without = {name for name in VALUES if name.startswith("interval_")} | {"feature"}
     if chosen.name == jet().name:
         without |= {"estimate"}
