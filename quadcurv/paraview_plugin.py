@@ -66,11 +66,11 @@ class QuadCurvature(VTKPythonAlgorithmBase):
     @smproperty.xml(
         '<IntVectorProperty name="ErrorBars" label="Error Bars" command="SetErrorBars" '
         'number_of_elements="1" default_values="0"><BooleanDomain name="bool"/>'
-        "<Documentation>Half widths of 95 % intervals, and creases, by jet and jet-auto.</Documentation>"
+        "<Documentation>Half widths of 95 % intervals, and creases, by jet.</Documentation>"
         "</IntVectorProperty>"
     )
     def SetErrorBars(self, number: int) -> None:
-        """Choose whether half widths of the intervals of "jet" and "jet-auto", and creases, are written."""
+        """Choose whether half widths of the intervals of "jet", and creases, are written."""
         self._set("_bars", number)
 
     def _set(self, name: str, number: int) -> None:

@@ -40,7 +40,7 @@ SURFACES = (
     "enneper",
     "tanh_sheet",
 )
-CHOOSING = "jet", "jet-auto"
+CHOOSING = ("jet",)
 NEAR = 4  # cells within which a fit may see what the undamaged mesh is off by
 
 

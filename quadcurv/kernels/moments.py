@@ -178,7 +178,7 @@ def _into_planes(normals, index, first, size, is_even, P, lane, triples=gathered
         steep = where(is_steep(up, inner(a, a) * share * share), 1.0, 0.0)
         x, y, z = x * inverse, y * inverse, muladd(bend / 2, square, z) * inverse
         even = where(inner(a, a) > 0, up * up / inner(a, a), share * share)
-        for i, value in enumerate((x, y, z, known * where(is_even & seen, even, 1.0))):
+        for i, value in enumerate((x, y, z, known * where(is_even, even, 1.0))):
             put_row(P, ROWS * m + i, value)
         more = (known, 1.0), (x, x), (x, y), (y, y), (steep, 1.0)
         sums.set(tuple(muladd(*pair, s) for s, pair in zip(sums.get(), more, strict=True)))

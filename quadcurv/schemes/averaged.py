@@ -67,19 +67,19 @@ def least_risks(
         at = np.flatnonzero(following == r)
         if at.size == 0:
             continue
-        six = rounded(around, 6, r, vertices[at])
+        fits = around.polynomials(vertices[at], 6, r, ghosts=False, kind=kernel.ROUND, nested=3)
         if noise2.size == 0:  # all have begun
-            of = np.where(sound(six, 6)[:, None], six[:, [kernel.SQUARE, kernel.FREEDOM]], np.nan)
+            of = fits[0][:, [kernel.SQUARE, kernel.FREEDOM]]
+            of = np.where(sound(fits[0], 6)[:, None], of, np.nan)
             square, freedom = spread(around, vertices, of, _NOISE).T
             noise2 = square / freedom
-        candidates = list(_candidates(around, vertices[at], r, noise2[at], six))
+        candidates = list(_candidates(around, vertices[at], r, noise2[at], fits))
         risks = np.stack([c.risk for c in candidates])
         best, risk = np.argmin(risks, axis=0), np.min(risks, axis=0)
-        fits, most2 = six.copy(), candidates[0].most2.copy()
-        for k, c in enumerate(candidates):
-            fits[best == k], most2[best == k] = c.fits[best == k], c.most2[best == k]
+        chosen = best, np.arange(at.size)
+        most2 = np.stack([c.most2 for c in candidates])[chosen]
         # What the difference to the fit before has beyond noise is bias (Hausman 1978).
-        new, gain2 = fits[:, :4], fits[:, kernel.GAIN : kernel.GAIN + 4] ** 2
+        new, gain2 = fits[..., :4][chosen], fits[..., kernel.GAIN : kernel.GAIN + 4][chosen] ** 2
         beyond = (new - values[at]) ** 2 - np.maximum(gains2[at] - gain2, 0.0) * noise2[at, None]
         better = risk < least[at]
         beyond = spread(around, vertices[at], np.where(better[:, None], beyond, np.nan), _POOL)
@@ -87,7 +87,7 @@ def least_risks(
         bias = np.sqrt(np.fmax(bias2, 0.0))
         for k, c in enumerate(candidates):
             now = (best == k) & better
-            yield vertices[at[now]], fits[now], c.degree, r, noise2[at[now]], bias[now]
+            yield vertices[at[now]], c.fits[now], c.degree, r, noise2[at[now]], bias[now]
         on = (risk < _WORSE * least[at]) | np.isinf(least[at])
         least[at] = np.minimum(risk, least[at])
         values[at[better]], gains2[at[better]] = new[better], gain2[better]
@@ -95,11 +95,12 @@ def least_risks(
 
 
 def _candidates(
-    around: Neighbourhoods, vertices: Indices, r: int, noise2: Floats, six: Floats
+    around: Neighbourhoods, vertices: Indices, r: int, noise2: Floats, fits: Floats
 ) -> Iterator[Candidate]:
-    """Degrees 6, 4 and 2 over so many rings, the lower ones where the bias permits them."""
+    """Degrees 6, 4 and 2 over so many rings."""
     from quadcurv.kernels import jet as kernel
 
+    six, four, two = fits
     excess = six[:, kernel.SQUARE] - six[:, kernel.FREEDOM] * noise2
     of = np.where(sound(six, 6)[:, None], np.stack((excess, six[:, kernel.FREEDOM]), axis=1), np.nan)
     excess, freedom = np.nan_to_num(spread(around, vertices, of, _POOL)).T
@@ -109,25 +110,17 @@ def _candidates(
     seen, most = (np.maximum(x, 0.0) * share for x in (excess - uneven - chance, excess))
     before = Candidate(six, 6, seen, most, noise2)
     yield before
-    risk, some = before.risk, np.ones(vertices.size, bool)
-    for degree in (4, 2):
-        terms = _TERMS[degree + 2]
+    for degree, lower in ((4, four), (2, two)):
         explained = before.fits[:, kernel.LOWER] - before.fits[:, kernel.SQUARE]
         explained = np.where(before.good, explained, np.nan)[:, None]
-        per_term = spread(around, vertices, explained, _POOL)[:, 0] / terms
+        per_term = spread(around, vertices, explained, _POOL)[:, 0] / _TERMS[degree + 2]
         excess = np.maximum(per_term - (1 + _CHANCE) * noise2, 0.0)
-        # Of what noise grows to with more terms these leave no more than a fifth.
-        better = (excess * 0.8 * before.gain2 < before.risk) & (before.risk <= risk)
-        some &= np.isinf(before.risk) | better
-        fits = np.full_like(six, np.nan)
-        fits[some] = rounded(around, degree, r, vertices[some])
-        gain2 = fits[:, kernel.GAIN] ** 2
+        gain2 = lower[:, kernel.GAIN] ** 2
         most = _MORE[degree] * gain2
         less = np.where(before.good, np.clip(before.gain2 - gain2, 0.0, _ONE_SIDED * most), most)
         seen = excess * less + np.nan_to_num(before.bias2)
         most = np.maximum(per_term - noise2, 0.0) * less + np.nan_to_num(before.most2 * gain2 / before.gain2)
-        risk = np.minimum(risk, before.risk)
-        before = Candidate(fits, degree, seen, most, noise2)
+        before = Candidate(lower, degree, seen, most, noise2)
         yield before
 
 
