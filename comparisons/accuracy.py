@@ -322,7 +322,7 @@ def direction_errors(scheme: str) -> Iterator[tuple[str, float, float]]:
             yield f"{name}, {kind}", own, min(_off(other, direction, apart) for other in others)
 
 
-def _off(found: Array, true: Array, at: Array) -> float:
+def _off(found: Array, true: Array, at: NDArray[np.bool_]) -> float:
     """Mean angle between lines, in degrees."""
     cosine = np.abs(np.einsum("ix,ix->i", found, true)) / np.linalg.norm(found, axis=1)
     return float(np.nanmean(np.rad2deg(np.arccos(np.minimum(cosine, 1)))[at]))
