@@ -150,15 +150,22 @@ class FaceRings:
 
         return nearby.means(*self._neighbours, values)
 
+    @cached_property
+    def _onward(self) -> scipy.sparse.csr_array:
+        """(points, faces) bool: of vertices that rings go on through, not those of very many faces."""
+        from quadcurv.kernels.gather import CROWDED
+
+        faces = np.diff(self.corners[0])
+        return self._incidence.multiply((faces > 0) & (faces <= 2 * CROWDED)).tocsr().T
+
     def positions(self, vertices: Indices, rings: int) -> Floats:
         """(k, m, 3): see `Neighbourhoods`."""
         incidence, k = self._incidence, vertices.size
-        onward = incidence.multiply(np.diff(self.corners[0]) > 0).tocsr().T  # not through those left out
         around = scipy.sparse.csr_array(
             (np.ones(k, bool), vertices, np.arange(k + 1)), (k, len(self.stencils.points))
         )
         for _ in range(rings):
-            around = around + around @ onward @ incidence
+            around = around + around @ self._onward @ incidence
         around.sort_indices()
         row, column = around.nonzero()
         other = column != vertices[row]

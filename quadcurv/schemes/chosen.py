@@ -38,6 +38,7 @@ _RESOLVED = 5.0
 _MORE = ((4, 3), (4, 4), (4, 5), (2, 3), (2, 4))
 _QUANTILE = 0.975
 _SMALLER = ((4, 2), (2, 1))
+_AT_ONCE = 2**13  # vertices that quadrics are fitted at
 _EXACT = 1e-3  # of the residuals of quadratic fits: all lie on one quadric
 _DOUBT = 0.02  # of the curvature, from which errors on others are asked
 _NEARLY_ALL, _MOST = 0.8, 0.5
@@ -188,12 +189,14 @@ def _quadrics(around: Neighbourhoods, vertices: Indices, found: _Found) -> None:
     more than one surface goes.
     """
     kernel = found.kernel
-    fits = quadrics(around, vertices, 3)
-    least = (around.rounding**2 * fits[:, kernel.FREEDOM], _EXACT**2 * fits[:, kernel.LOWER])
-    exact = fits[:, kernel.SQUARE] <= np.maximum(*least)
-    at, fits = vertices[exact], fits[exact]
-    apart = np.nan_to_num(np.abs(fits[:, :4] - found.values[at, :4])) / 2
-    found.put_noisy(at, fits, 2, 3, fits[:, kernel.SIGMA], apart)
+    for start in range(0, vertices.size, _AT_ONCE):
+        at = vertices[start : start + _AT_ONCE]
+        fits = quadrics(around, at, 3)
+        least = (around.rounding**2 * fits[:, kernel.FREEDOM], _EXACT**2 * fits[:, kernel.LOWER])
+        exact = fits[:, kernel.SQUARE] <= np.maximum(*least)
+        at, fits = at[exact], fits[exact]
+        apart = np.nan_to_num(np.abs(fits[:, :4] - found.values[at, :4])) / 2
+        found.put_noisy(at, fits, 2, 3, fits[:, kernel.SIGMA], apart)
 
 
 def _in_noise(around: Neighbourhoods, vertices: Indices, steep: Indices, noisy: Indices) -> Indices:

@@ -26,22 +26,22 @@ def quadrics(around: Neighbourhoods, vertices: Indices, rings: int) -> Floats:
     out = np.full((vertices.size, kernel.COLUMNS), np.nan)
     positions, normals = around.positions(vertices, rings, ghosts=False)
     apart = positions[:, 1:] - positions[:, :1]
-    known = np.isfinite(apart[..., 0])
-    count = known.sum(axis=1)
-    fitted = np.flatnonzero((count > TERMS) & np.any(normals != 0, axis=1))
+    count = np.isfinite(apart[..., 0]).sum(axis=1)
+    apart, length = np.nan_to_num(apart), np.linalg.norm(normals, axis=1)
+    size = np.sqrt((apart**2).sum(axis=(1, 2)) / np.maximum(count, 1))
+    fitted = np.flatnonzero((count > TERMS) & (size > 0) & (length > 0))  # a normal may be NaN
     if fitted.size == 0:
         return out
-    apart, known, count = np.nan_to_num(apart[fitted]), known[fitted], count[fitted]
+    apart, count, size = apart[fitted], count[fitted], size[fitted]
     frames = _frames(normals[fitted])
-    size = np.sqrt((apart**2).sum(axis=(1, 2)) / count)
     x, y, z = np.einsum("kmi,kji->jkm", apart / size[:, None, None], frames)
     terms = np.stack((x, y, x * x, x * y, y * y, x * z, y * z, z * z), axis=-1)
     inverse = np.linalg.pinv(terms, rcond=_RANK)
     coefficients = np.einsum("ktm,km->kt", inverse, z)
     rest = z - np.einsum("kmt,kt->km", terms, coefficients)
     square, freedom = (rest**2).sum(axis=1), count - TERMS
-    first = np.linalg.pinv(terms[..., :5], rcond=_RANK)
-    lower = z - np.einsum("kmt,kts,ks->km", terms[..., :5], first, z)
+    plain = np.linalg.pinv(terms[..., :5], rcond=_RANK)
+    lower = z - np.einsum("kmt,kt->km", terms[..., :5], np.einsum("kts,ks->kt", plain, z))
 
     a, b, c, d, e, f, g, h = coefficients.T
     gradient = np.stack((-a, -b, np.ones_like(a)), axis=1)
