@@ -230,7 +230,8 @@ def test_staggered_grid_is_its_diamonds(scheme):
     grid = surfaces.torus().sample((10, 12), "staggered")[0]
     stencils = grid.stencils()
     H = qc.mean_curvature(grid, scheme).ravel()
-    faces = qc.mean_curvature((stencils.points, stencils.faces), scheme, boundary="nan")[: stencils.n]
+    mesh = qc.QuadMesh(stencils.points, stencils.faces)
+    faces = qc.mean_curvature(mesh, scheme, boundary="nan")[: stencils.n]
     assert relative(H, faces) < 1e-12
 
 
