@@ -194,6 +194,9 @@ def _quadrics(around: Neighbourhoods, vertices: Indices, found: _Found) -> None:
         fits = quadrics(around, at, 3)
         least = (around.rounding**2 * fits[:, kernel.FREEDOM], _EXACT**2 * fits[:, kernel.LOWER])
         exact = fits[:, kernel.SQUARE] <= np.maximum(*least)
+        # Few rows along a border are on many quadrics: there a fit that knows its error knows better.
+        apart = np.abs(fits[:, 0] - found.values[at, 0])
+        exact &= ~((apart > found.errors(at)[:, 0]) & np.isfinite(around.border_error(3)[at]))
         at, fits = at[exact], fits[exact]
         apart = np.nan_to_num(np.abs(fits[:, :4] - found.values[at, :4])) / 2
         found.put_noisy(at, fits, 2, 3, fits[:, kernel.SIGMA], apart)
