@@ -335,7 +335,7 @@ def test_rejected_arguments():
     with pytest.raises(ValueError, match="number: expected at least 1 thread and at most 1024, got 0"):
         qc.set_threads(0)
     with pytest.raises(ValueError, match=r"scheme: .* is a fit"):
-        qc.evaluate(grid, "mean_curvature", scheme="jet")
+        qc.stiffness_matrix(grid, "jet")
 
 
 def test_neither_points_nor_order_nor_type_are_the_callers_problem():

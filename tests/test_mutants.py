@@ -18,6 +18,7 @@ from comparisons.chapter4 import measure as formulas
 from comparisons.claims import judge, markdown
 from comparisons.measured import Measured
 from quadcurv import StaggeredGrid
+from quadcurv.kernels import border
 from quadcurv.schemes import SCHEMES, Laplacian
 from quadcurv.surfaces import Surface, catenoid
 
@@ -75,9 +76,18 @@ def ghost_weights(monkeypatch: pytest.MonkeyPatch) -> None:
                     module, name, lambda *given, right=right, **named: off(right(*given, **named))
                 )
                 found += 1
-        if hasattr(module, "_WEIGHTS"):
-            monkeypatch.setattr(module, "_WEIGHTS", off(module._WEIGHTS))
     assert found
+    continue_sides = border.continue_sides
+
+    def continued(points, wrap, limits):
+        beyond, beside, excess = continue_sides(points, wrap, limits)
+        if not wrap[0]:
+            beyond += 0.2 * (points[[0, -1]] - points[[1, -2]])
+        if not wrap[1]:
+            beside[:, 1:-1] += 0.2 * np.swapaxes(points[:, [0, -1]] - points[:, [1, -2]], 0, 1)
+        return beyond, beside, excess
+
+    monkeypatch.setattr(border, "continue_sides", continued)
 
 
 def no_dual_points_of_curves(monkeypatch: pytest.MonkeyPatch) -> None:
