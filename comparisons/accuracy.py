@@ -29,6 +29,7 @@ from comparisons import cases
 from comparisons.cases import Array, Case
 from comparisons.goals import Goal, table
 from comparisons.peers import hindsight
+from quadcurv.estimate import disagreement
 from quadcurv.refinement import fitted_rate
 from quadcurv.schemes import SCHEMES, Fit, Laplacian
 
@@ -178,8 +179,11 @@ def coverage(schemes: Sequence[str]) -> Iterator[tuple[str, str, float, str, flo
                         yield scheme, surface, level, q, float(share), float(size)
 
 
-def estimates(scheme: str) -> Iterator[tuple[str, float, float]]:
-    """Surface, rank correlation and size over the true error of half an interval's half width, no noise."""
+def estimates(scheme: str) -> Iterator[tuple[str, str, float, float]]:
+    """What is estimated and how, surface, rank correlation, size over that of the true error; no noise.
+
+    Half the half width of the scheme's own intervals, and `disagreement` of degree 4 with the scheme.
+    """
     meshes = {
         **surfaces(),
         "jittered": cases.ellipsoid().jittered(cases.cubed(16), 0.2),
@@ -188,16 +192,22 @@ def estimates(scheme: str) -> Iterator[tuple[str, float, float]]:
     for name, case in meshes.items():
         found = fit(case, scheme)
         bars = error_bars(found, "mean")
-        if bars is None:
-            yield name, NAN, NAN
-            continue
-        error, bar = np.abs(found.mean - case.H), bars / 2
-        known = np.isfinite(error) & np.isfinite(bar)
-        yield (
-            name,
-            float(spearmanr(error[known], bar[known]).statistic),
-            float(bar[known].mean() / error[known].mean()),
-        )
+        own = np.full(found.mean.shape, NAN) if bars is None else bars / 2
+        yield "interval", name, *_likeness(found.mean - case.H, own)
+    quartic = qc.schemes.jet(4)
+    for name, case in meshes.items():
+        H = fit(case, quartic).mean
+        yield "degree 4", name, *_likeness(H - case.H, disagreement(case.mesh, quartic, scheme))
+
+
+def _likeness(error: Array, estimate: Array) -> tuple[float, float]:
+    """Rank correlation of magnitudes, and the ratio of their means."""
+    error, estimate = np.abs(error), np.abs(estimate)
+    known = np.isfinite(error) & np.isfinite(estimate)
+    if not known.any():
+        return NAN, NAN
+    rank = float(spearmanr(error[known], estimate[known]).statistic)
+    return rank, float(estimate[known].mean() / error[known].mean())
 
 
 # Features -----------------------------------------------------------------------------------------
@@ -488,10 +498,17 @@ def bars(scheme: str) -> Part:
         rows,
     )
     found = list(estimates(scheme))
-    part.least("estimated error without noise: rank correlation", {n: r for n, r, _ in found}, 0.9, 0.95)
-    size = {n: max(q, 1 / q) if q > 0 else NAN for n, _, q in found}
-    part.most("estimated error without noise: times too large or small", size, 1.5, 1.2)
-    part.detail("estimated error without noise", ("mesh", "rank correlation", "estimated / true"), found)
+    for kind, what in (
+        ("degree 4", "error of degree 4 by its difference to the default, no noise"),
+        ("interval", "error by half an interval, no noise"),
+    ):
+        own = {name: (rank, share) for k, name, rank, share in found if k == kind}
+        part.least(f"{what}: rank correlation", {name: rank for name, (rank, _) in own.items()}, 0.9, 0.95)
+        size = {name: max(q, 1 / q) if q > 0 else NAN for name, (_, q) in own.items()}
+        part.most(f"{what}: times too large or small", size, 1.5, 1.2)
+    part.detail(
+        "estimated error without noise", ("of", "mesh", "rank correlation", "estimated / true"), found
+    )
     return part
 
 
