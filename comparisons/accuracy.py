@@ -42,7 +42,7 @@ ROUNDING = 1e-11
 """Errors of H below it are rounding, which has no order: what is exact is of every order."""
 
 
-def fit(case: Case, scheme: str) -> qc.Curvatures:
+def fit(case: Case, scheme: str | Fit) -> qc.Curvatures:
     """Curvatures by name, without what is warned of."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
