@@ -35,6 +35,11 @@ class Page:
         browser.get("about:blank")  # or another address would load nothing
         browser.get_log("browser"), browser.get_log("performance")
         browser.get(f"{path.as_uri()}#{address}")
+        self.drawn()
+
+    def drawn(self):
+        """Wait until what was asked for has been drawn: a screen's next picture but one."""
+        self.browser.execute_async_script("requestAnimationFrame(() => requestAnimationFrame(arguments[0]))")
 
     def all(self, selector):
         return self.browser.find_elements("css selector", selector)
@@ -419,6 +424,9 @@ def test_page_in_a_frame_is_drawn_and_logs_no_error(browser, ellipsoid, tmp_path
     path = tmp_path / "notebook.html"
     path.write_text(f"<!doctype html><body>{viewing.html_page(ellipsoid)._repr_html_()}", encoding="utf-8")
     frame = Page(browser, path)
+    browser.switch_to.frame(0)
+    frame.drawn()
+    browser.switch_to.default_content()
     browser.save_screenshot(str(tmp_path / "frame.png"))
     assert coloured(pixels(tmp_path / "frame.png")).mean() > 0.05
     browser.switch_to.frame(0)
