@@ -24,7 +24,7 @@ from comparisons.goals import Ratio
 from comparisons.meshes import torus, triangles
 
 Floats = NDArray[np.float64]
-SIZES = {100: 9, 256: 5, 1000: 2}
+SIZES = {100: 9, 256: 5}
 """Vertices a side, and rounds."""
 NOISE = (0.0, 1e-3, 1e-2, 5e-2)
 """Of every coordinate, in spacings."""

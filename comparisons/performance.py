@@ -1,7 +1,7 @@
 """Time and memory of the fast schemes beside other libraries and beside a copy of the same bytes.
 
 All contestants of a table run in one process in turn, round after round; what is given is the median over
-the rounds of the ratio within a round, and its quartiles. Run on a quiet computer, some eight minutes:
+the rounds of the ratio within a round, and its quartiles. Run on a quiet computer, some fifteen minutes:
 
     python -m comparisons.performance [--against PATH]
 
