@@ -14,6 +14,7 @@ from quadcurv.drivers import blocks, compiled, device, direct, fits
 from quadcurv.drivers.answers import shapes
 from quadcurv.drivers.averages import averaged, checked_radius
 from quadcurv.drivers.fits import each
+from quadcurv.drivers.targets import checked_out
 from quadcurv.mesh import GridBlocks, Mesh, QuadGrid, QuadMesh, StaggeredGrid
 from quadcurv.schemes import Curvatures, Fit, Laplacian, Scheme
 from quadcurv.stencils import Stencils
@@ -149,9 +150,7 @@ def arrays(
     mesh: Mesh | GridBlocks, scheme: Scheme, wanted: Iterable[str], out: Mapping[str, Floats] | None = None
 ) -> dict[str, Floats]:
     """The caller's arrays, which kernels will write to without looking again, or new ones."""
-    out = {} if out is None else out
-    if not isinstance(out, Mapping):
-        raise ValueError(f"out: expected a mapping from names to arrays, got {type(out).__name__}")
+    out = checked_out(out)
     if isinstance(mesh, GridBlocks) and out:
         raise ValueError("out: blocks have an array each, which are new ones")
     shape = (len(mesh.points),) if isinstance(mesh, QuadMesh) else mesh.shape

@@ -30,6 +30,15 @@ FITTED: dict[str, tuple[tuple[int, ...], Callable[[Curvatures], Any]]] = {
 """What a fit gives by name, and the shape of one vertex's answer."""
 
 
+_TELLING = ("mean_curvature", "mean_curvature_normal", "k1")
+
+
+def telling(names: Iterable[str]) -> str | None:
+    """The result by which what rounding costs is told, the first of its kind, if there is one."""
+    given = set(names)
+    return next((name for name in _TELLING if name in given), None)
+
+
 def shapes(scheme: Scheme, wanted: Iterable[str], argument: str = "wanted") -> dict[str, tuple[int, ...]]:
     """Shapes of one vertex's answers by name, each once; ValueError where a scheme gives none."""
     known = {name: shape for name, (shape, _) in FITTED.items()} if isinstance(scheme, Fit) else PER_VERTEX

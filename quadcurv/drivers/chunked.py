@@ -18,7 +18,7 @@ import numpy as np
 from quadcurv.boundary import checked_boundary
 from quadcurv.drivers import DOUBLE
 from quadcurv.drivers.progress import tracked
-from quadcurv.drivers.targets import checked_target
+from quadcurv.drivers.targets import checked_out, targets
 from quadcurv.drivers.tasks import BORDER, Task, with_holes
 from quadcurv.drivers.windows import (
     Cut,
@@ -108,7 +108,8 @@ def evaluate(
     """Results by name, into the arrays of `out` where there are any."""
     checked_boundary(boundary)
     lead = tuple(int(n) for n in grid.points.shape[:-3])
-    results = _arrays(task, lead + grid.shape, {} if out is None else out, grid)
+    shapes = {name: lead + grid.shape + more for name, more in task.shapes.items()}
+    results = targets(shapes, checked_out(out), (grid.points, grid.dual, grid.mask, *task.others))
     for at in np.ndindex(*lead):
         own = {name: _entry(array, at) for name, array in results.items()}
         one = entry(grid, at)
@@ -301,18 +302,3 @@ def hole_refused(hole: HoleError) -> MeshError:
     return MeshError(
         f'points: NaN at vertex {hole.place}; ChunkedGrid(points, mask="nan") takes it for a hole'
     )
-
-
-def _arrays(task: Task, shape: tuple[int, ...], out: Mapping[str, Any], grid: ChunkedGrid) -> dict[str, Any]:
-    """The caller's arrays, or new ones in memory."""
-    if not isinstance(out, Mapping):
-        raise ValueError(f"out: expected a mapping from names to arrays, got {type(out).__name__}")
-    results: dict[str, Any] = {}
-    for name, more in task.shapes.items():
-        full = shape + more
-        if name not in out:
-            results[name] = np.empty(full)
-            continue
-        others = grid.points, grid.dual, grid.mask, *task.others, *results.values()
-        results[name] = checked_target(out[name], name, full, others)
-    return results

@@ -29,9 +29,8 @@ def results(
         return parts.evaluate(mesh, wanted, scheme, boundary, out, progress)
     if isinstance(scheme, Laplacian):
         found = drivers.run(mesh, scheme, wanted, boundary, out)
-        for name in found.keys() & {"mean_curvature", "mean_curvature_normal"}:
+        if (name := answers.telling(found)) is not None:
             warn_of_rounding(mesh, found[name])
-            break
     else:
         if drivers.device.holds(mesh):
             drivers.device.checked_scheme(scheme)

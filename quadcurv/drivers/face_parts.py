@@ -12,7 +12,7 @@ from quadcurv.boundary import REACH, checked_boundary
 from quadcurv.checks import Finding
 from quadcurv.drivers import answers, fits
 from quadcurv.drivers.progress import tracked
-from quadcurv.drivers.targets import checked_target
+from quadcurv.drivers.targets import checked_out, targets
 from quadcurv.mesh import part_sides
 from quadcurv.mesh.face_parts import FaceParts
 from quadcurv.mesh.mapped import forget
@@ -39,9 +39,9 @@ def evaluate(
 ) -> dict[str, Any]:
     """Results by name, into arrays of `out` where there are any; see `FaceParts`."""
     checked_boundary(boundary)
-    if out is not None and not isinstance(out, Mapping):
-        raise ValueError(f"out: expected a mapping from names to arrays, got {type(out).__name__}")
-    results = _arrays(mesh, wanted, scheme, {} if out is None else out)
+    given = checked_out(out)
+    shapes = answers.shapes(scheme, (*wanted, *given))
+    results = targets({name: mesh.shape + one for name, one in shapes.items()}, given, (mesh.points,))
     try:
         said = _by_parts(mesh, scheme, boundary, results, progress)
     except part_sides.SidesError:
@@ -49,10 +49,9 @@ def evaluate(
         said = _by_parts(mesh, scheme, boundary, results, progress)
     if said:
         warn("; ".join(said))
-    for name in results.keys() & {"mean_curvature", "mean_curvature_normal", "k1"}:
+    if (name := answers.telling(results)) is not None:
         some = np.asarray(results[name][:: mesh.shape[0] // _LOOKED_AT + 1])
         warn_of_error(*error_at_edges(*mesh.some_edges(), mesh.roundoff), mesh.roundoff, some)
-        break
     return results
 
 
@@ -161,15 +160,3 @@ def part_results(mesh: FaceParts, p: int, job: _Job, alone: bool = False) -> Ans
 def _places(owned: Indices, vertices: Indices) -> Indices:
     order = np.argsort(owned)
     return order[np.searchsorted(owned[order], vertices)]
-
-
-def _arrays(mesh: FaceParts, wanted: Iterable[str], scheme: Scheme, out: Mapping[str, Any]) -> dict[str, Any]:
-    """The caller's arrays, anything that takes slices, or new ones in memory."""
-    results: dict[str, Any] = {}
-    for name, shape in answers.shapes(scheme, (*wanted, *out)).items():
-        full = mesh.shape + shape
-        if name in out:
-            results[name] = checked_target(out[name], name, full, (mesh.points, *results.values()))
-        else:
-            results[name] = np.empty(full)
-    return results

@@ -4,10 +4,30 @@ from __future__ import annotations
 
 import mmap
 import os
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 import numpy as np
+
+
+def checked_out(out: Mapping[str, Any] | None) -> Mapping[str, Any]:
+    """The caller's arrays by name, none where there is no mapping; ValueError where it is something else."""
+    if out is not None and not isinstance(out, Mapping):
+        raise ValueError(f"out: expected a mapping from names to arrays, got {type(out).__name__}")
+    return {} if out is None else out
+
+
+def targets(
+    shapes: Mapping[str, tuple[int, ...]], out: Mapping[str, Any], sources: Iterable[Any]
+) -> dict[str, Any]:
+    """Arrays of some shapes by name, those of `out` or new ones, that share nothing with what is read."""
+    results: dict[str, Any] = {}
+    for name, shape in shapes.items():
+        if name in out:
+            results[name] = checked_target(out[name], name, shape, (*sources, *results.values()))
+        else:
+            results[name] = np.empty(shape)
+    return results
 
 
 def checked_target(array: Any, name: str, shape: tuple[int, ...], sources: Iterable[Any]) -> Any:
