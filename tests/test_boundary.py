@@ -413,3 +413,49 @@ def test_two_quintic_layers_are_of_sixth_order():
 def test_layers_need_points():
     with pytest.raises(MeshError, match=r"points: 5 rows, but extrapolation .* needs at least 6"):
         ghost_layer(np.zeros((5, 9, 3)), (False, False), degree=5, layers=2)
+
+
+# ---- fitted surfaces ------------------------------------------------------------------------------------
+
+
+def test_fitted_surfaces_are_weighted_least_squares(rng):
+    """Eight at a time and alone: coefficients, noise, and its gains, as numpy's own least squares have them."""
+    from quadcurv.kernels import nearby, surfaces, topology
+
+    uv, faces = square(5)
+    points = quartic(*(5 * (uv + 1) + rng.uniform(-0.2, 0.2, uv.shape)).T)
+    given = QuadMesh(points + rng.normal(0, 1e-3, points.shape), faces).stencils()
+    vertices = np.flatnonzero(~given.closed)[:19]
+    corners = topology.corners_by_vertex(given.faces, given.n)
+    around, ring = nearby.rings_around(given.faces, *corners, vertices, 5, 80)
+    frames = np.broadcast_to(np.eye(3), (19, 3, 3))
+    kinds = ((5, 5), (4, 4), (2, 2), (2, 1))
+    ways = frames, *zip(*kinds, strict=True)
+    found = surfaces.fits(given.points, 0 * given.ring_areas, True, around, ring, *ways)
+    one = surfaces.fits(
+        given.points, 0 * given.ring_areas, True, around[3:4], ring[3:4], frames[:1], *ways[1:]
+    )
+    np.testing.assert_array_equal(one[0], found[3])
+    for k, v in enumerate(vertices):
+        for i, (degree, rings) in enumerate(kinds):
+            near, T = around[k][(ring[k] > 0) & (ring[k] <= rings)], (degree + 1) * (degree + 2) // 2 - 1
+            if near.size <= T:
+                assert np.isnan(found[k, i]).all()
+                continue
+            x = given.points[near] - given.points[v]
+            u = x[:, :2] @ found[k, i, :4].reshape(2, 2).T
+            assert np.allclose(u.T @ u / (u**2).sum() * 2, np.eye(2), atol=1e-12)
+            r = np.linalg.norm(u, axis=1)
+            assert np.isclose(r.max(), 1)
+            w = (1 - r / surfaces.SPREAD) ** 4 * (4 * r / surfaces.SPREAD + 1)
+            terms = np.stack([u[:, 0] ** a * u[:, 1] ** b for a, b in surfaces.TERMS[:T]], axis=1)
+            maps = np.linalg.pinv(w[:, None] * terms) * w
+            left = w * (x[:, 2] - terms @ maps @ x[:, 2])
+            free = np.trace((np.eye(near.size) - (w[:, None] * terms) @ maps / w) * w**2)
+            noise = np.sqrt((left**2).sum() / free)
+            first = np.flatnonzero(ring[k][(ring[k] > 0) & (ring[k] <= rings)] == 1)
+            beyond = np.stack([(-u[first, 0]) ** a * (-u[first, 1]) ** b for a, b in surfaces.TERMS[:T]])
+            gain = np.sqrt(((beyond.T @ maps) ** 2).sum() / first.size)
+            np.testing.assert_allclose(found[k, i, 4 : 4 + T], maps @ x[:, 2], rtol=1e-9, atol=1e-11)
+            np.testing.assert_allclose(found[k, i, surfaces.NOISE], noise, rtol=1e-8)
+            np.testing.assert_allclose(found[k, i, surfaces.GAIN], gain, rtol=1e-9)

@@ -158,10 +158,10 @@ def test_the_time_grows_with_the_valence_not_with_its_square(scheme):
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    ("scheme", "seconds"), [("finite_volume", 60), ("liu", 60), ("bunge", 60), ("jet", 240)]
+    ("scheme", "seconds"), [("finite_volume", 10), ("liu", 10), ("bunge", 10), ("jet", 40)]
 )
 def test_valence_of_a_hundred_thousand(scheme, seconds):
-    """Its border has as many vertices, each closed by a surface of its own, which is what takes the time."""
+    """Its border has as many vertices, each closed by a surface of its own: 3 to 4 and 15 s on quiet cores."""
     begin = time.process_time()
     H = qc.mean_curvature(fan(100_000), scheme)
     assert time.process_time() - begin < seconds

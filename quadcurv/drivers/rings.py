@@ -192,13 +192,13 @@ def _across(points: Floats, axis: int, wraps: bool) -> Floats:
 def bundles(points: Floats) -> Stencils:
     """Faces that lead from the first of each (k, m, 3) points to its others, and nowhere else."""
     k, m, _ = points.shape
-    index = np.where(np.isnan(points[:, 1:, 0]), -1, np.arange(k * (m - 1)).reshape(k, m - 1) + k)
-    index = np.pad(index, [(0, 0), (0, -(m - 1) % 3)], constant_values=-1).reshape(k, -1, 3)
-    faces = np.concatenate(
-        (np.broadcast_to(np.arange(k)[:, None, None], (*index.shape[:2], 1)), index), axis=2
-    )
-    flat = np.concatenate((points[:, 0], np.nan_to_num(points[:, 1:]).reshape(-1, 3)))
-    return Stencils(flat, faces.reshape(-1, 4).astype(np.int32), (k,), np.ones(k, bool))
+    missing = np.isnan(points[:, 1:, 0])
+    faces = np.full((k, -(-(m - 1) // 3), 4), -1, np.int32)
+    index = np.full((k, 3 * faces.shape[1]), -1, np.int32)
+    index[:, : m - 1] = np.where(missing, -1, np.arange(k * (m - 1)).reshape(k, m - 1) + k)
+    faces[..., 0], faces[..., 1:] = np.arange(k)[:, None], index.reshape(k, -1, 3)
+    flat = np.concatenate((points[:, 0], np.where(missing[..., None], 0.0, points[:, 1:]).reshape(-1, 3)))
+    return Stencils(flat, faces.reshape(-1, 4), (k,), np.ones(k, bool))
 
 
 def _over(fits: Callable[[Floats, int, int], None], size: int, nested: int) -> Floats:
