@@ -5,7 +5,7 @@ What has no regular ring, and what is cut off at open sides, comes from `direct`
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from functools import partial
 
 import numpy as np
@@ -22,6 +22,9 @@ from quadcurv.types import Floats, Indices
 # Of one vertex of a face list and of one row of a matrix, in vertices of a grid.
 _RING_WORK, _ROW_WORK = 4, 8
 _RESULTS = ("mean_curvature_normal", "mean_curvature", "vertex_normals", "dual_areas")
+_NOBODY = np.empty(0, np.int64)  # of the vertices
+_NOTHING = np.empty(0)  # a result that nobody wants
+_CLOSED = Frame(_NOTHING, _NOTHING)  # what is beyond a grid is its other side
 
 
 def evaluate_faces(mesh: QuadMesh, scheme: Laplacian, boundary: str, results: Mapping[str, Floats]) -> None:
@@ -111,24 +114,22 @@ def evaluate_rows(
 
     The frame may be known: cells of other grids, or points of the grid that this is cut from.
     """
-    from quadcurv.kernels import cells, ranges, rows
     from quadcurv.kernels.compiled import flat
+    from quadcurv.kernels.ranges import over
+    from quadcurv.kernels.rows import LEAST_ROWS, grid_curvatures
 
-    wanted, liu = _wanted(results), diamond_of.area == "quads"
-    r, c = grid.shape
+    (r, c), unserved = grid.shape, _NOBODY
+    if around is None and all(grid.wrap):
+        around = _CLOSED
+    kernel: Callable[..., None]
     if isinstance(grid, QuadGrid):
-        unserved = np.empty(0, np.int64)
         if around is None:
             around, unserved = frame(grid, boundary)
-        kernel = partial(rows.grid_curvatures, flat(grid.points), 3 * c, *_flat(around), liu, *wanted)
+        kernel, points, size, more = grid_curvatures, flat(grid.points), 3 * c, ()
     else:
-        dual = grid.dual
-        for axis in (0, 1):
-            first, last = np.moveaxis(dual, axis, 0)[[0, -1]]
-            if grid.wrap[axis] and not np.array_equal(first, last):  # the seam is that of the first
-                dual = dual.copy()
-                np.moveaxis(dual, axis, 0)[-1] = first
-        points, size, unserved = flat(grid.primal), 3 * c, np.empty(0, np.int64)
+        from quadcurv.kernels.cells import staggered_curvatures
+
+        kernel, points, size, more = staggered_curvatures, flat(grid.primal), 3 * c, (flat(_dual(grid)),)
         if around is not None:
             pass
         elif grid.has_ghosts:
@@ -139,20 +140,25 @@ def evaluate_rows(
             around, unserved = frame(grid, boundary)
             if boundary == "extrapolate":
                 unserved = np.union1d(unserved, cells_at_poles(grid))
-        kernel = partial(cells.staggered_curvatures, points, size, *_flat(around), flat(dual), liu, *wanted)
-    ranges.over(kernel, r, r * c, rows.LEAST_ROWS)
+    given = (flat(around.beyond), flat(around.beside), *more, diamond_of.area == "quads", *_wanted(results))
+    over(partial(kernel, points, size, c, *given), r, r * c, LEAST_ROWS)
     return unserved
 
 
-def _flat(frame: Frame) -> tuple[Floats, Floats]:
-    from quadcurv.kernels.compiled import flat
-
-    return flat(frame.beyond), flat(frame.beside)
+def _dual(grid: StaggeredGrid) -> Floats:
+    """Dual points, those of a seam being the first."""
+    dual = grid.dual
+    for axis in (0, 1):
+        first, last = np.moveaxis(dual, axis, 0)[[0, -1]]
+        if grid.wrap[axis] and not np.array_equal(first, last):
+            dual = dual.copy()
+            np.moveaxis(dual, axis, 0)[-1] = first
+    return dual
 
 
 def _wanted(results: Mapping[str, Floats]) -> list[Floats]:
     """Results in the order of kernels, each of one dimension; of size 0 where nobody asks."""
-    return [results[name].ravel() if name in results else np.empty(0) for name in _RESULTS]
+    return [results[name].reshape(-1) if name in results else _NOTHING for name in _RESULTS]
 
 
 def _evaluate_rings(mesh: QuadMesh, diamond_of: Diamond, results: Mapping[str, Floats]) -> None:

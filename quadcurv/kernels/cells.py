@@ -3,6 +3,8 @@
 As that of `rows`; a and b are the rows of dual points before and after row p.
 """
 
+import numpy as np
+
 from quadcurv.kernels.compiled import kernel
 from quadcurv.kernels.formulas import Carried, bits, formula, span, where
 from quadcurv.kernels.quad import fluxes, quads_scale, ring_scale
@@ -15,6 +17,7 @@ from quadcurv.kernels.rows import (
     QUAD_SQUARE,
     RING,
     RING_SCALE,
+    ROOM,
     ROW,
     SCALE,
     SQUARE,
@@ -23,6 +26,7 @@ from quadcurv.kernels.rows import (
     WIDTH,
     S,
     Y,
+    clear_rooms,
     dual_areas,
     is_clear,
     last_quad,
@@ -200,17 +204,20 @@ def cell_curvatures(planes, p, q, a, b, work, part, scale, H, g, at, width):
 
 
 @kernel
-def _pass(points, size, beyond, beside, dual, liu, Hn, H, normal, area, start, stop, planes, part, work):
-    c, rows = beyond.size // 6, points.size // size
+def _pass(points, size, c, beyond, beside, dual, liu, Hn, H, normal, area, start, stop, room):
+    planes, part, work = rooms(room)
+    rows, around = points.size // size, beyond.size == 0
     vectors, numbers, normals, areas = Hn.size > 0, H.size > 0, normal.size > 0, area.size > 0
     scale = RING_SCALE if liu else SCALE
     for begin in range(0, c, WIDTH):
         end = min(begin + WIDTH, c)
         p, q, a, b, far = 0, ROW, 2 * ROW, 3 * ROW, 0
+        clear_rooms(planes, part, work, end - begin)
         for i in range(start - 1, stop + 1):  # p and a are rows i - 1 once they are there
-            inside = 0 <= i < rows
-            first = size * i if inside else 0 if i < 0 else 3 * c
-            to, width, row = q + FIRST, end - begin, i + 1
+            ahead = i % rows if around else i
+            inside = 0 <= ahead < rows
+            first = size * ahead if inside else 0 if ahead < 0 else 3 * c
+            to, width, row = q + FIRST, end - begin, ahead + 1
             far = load_row(planes, to, points, beyond, inside, first + 3 * begin, width, far)
             far = load_ends(planes, to, points, beyond, beside, inside, first, begin, end, c, row, rows, far)
             if i >= start:
@@ -243,17 +250,16 @@ def _pass(points, size, beyond, beside, dual, liu, Hn, H, normal, area, start, s
             p, q, a, b = q, p, b, a
 
 
-def staggered_curvatures(points, size, beyond, beside, dual, liu, Hn, H, normal, area, start, stop):
+def staggered_curvatures(points, size, c, beyond, beside, dual, liu, Hn, H, normal, area, start, stop):
     """As `grid_curvatures`, of the primal points of a staggered grid.
 
     Parameters
     ----------
-    points, size, beyond, beside
+    points, size, c, beyond, beside
         As for `grid_curvatures`, of primal points.
     dual : (3 (r + 1) (c + 1),) float64
         Dual points; those of the first row and column come before the first primal ones.
     liu, Hn, H, normal, area, start, stop
         As for `grid_curvatures`.
     """
-    scratch = rooms(beyond.size // 6, 23 * S)
-    _pass(points, size, beyond, beside, dual, liu, Hn, H, normal, area, start, stop, *scratch)
+    _pass(points, size, c, beyond, beside, dual, liu, Hn, H, normal, area, start, stop, np.empty(ROOM))

@@ -52,8 +52,9 @@ def kernel(function):
 
 def flat(array, dtype=None):
     """An array as kernels read it: of one dimension and read-only, so that there is one program for all."""
-    array = np.ascontiguousarray(array, dtype).reshape(-1).view()
-    array.flags.writeable = False
+    array = np.ascontiguousarray(array, dtype).reshape(-1)
+    if array.flags.writeable:
+        array.flags.writeable = False
     return array
 
 

@@ -482,6 +482,11 @@ def less_half(bits, x):
     return Real(builder.bitcast(builder.sub(_INT(bits), half), _DOUBLE))
 
 
+def address(values):
+    """Where the memory of an array begins."""
+    return Whole(_desk.drafts[-1].builder.ptrtoint(values.data, _INT))
+
+
 def prefetch(values, index, write=False):
     """Ask for the memory of an entry of an array, which need not exist."""
     if isinstance(values, Memory):

@@ -10,8 +10,8 @@ same place of another page waits for it; so placed, loads keep ahead of stores.)
 
 import numpy as np
 
-from quadcurv.kernels.compiled import kernel
-from quadcurv.kernels.formulas import Carried, bits, formula, from_bits, prefetch, span, where
+from quadcurv.kernels.compiled import helper, kernel
+from quadcurv.kernels.formulas import Carried, address, bits, formula, from_bits, prefetch, span, where
 from quadcurv.kernels.quad import fluxes, quads_area, quads_scale, ring_area, ring_scale
 from quadcurv.kernels.vector import (
     apart,
@@ -32,7 +32,7 @@ from quadcurv.kernels.vector import (
 )
 
 WIDTH = 2048  # columns done at once: their rows stay in the second-level cache
-STRETCH = 64  # of them, by one loop after the other: what these leave stays in the first-level cache
+STRETCH = 80  # of them, by one loop after the other: what these leave stays in the first-level cache
 LEAST_ROWS = 16  # of a range of its own, which computes a row of quads that others compute too
 PAGE = 512  # doubles
 Y = WIDTH + PAGE // 2  # between planes of a row
@@ -47,21 +47,43 @@ NORMAL, LENGTH, U, V, RING, SQUARE, RING_SCALE, SCALE, AREA, QUAD_SQUARE = (
     k * S for k in (0, 3, 4, 7, 10, 13, 14, 15, 16, 17)
 )
 PLANES = 16  # of the rows and of `part`
-ROOM = PLANES * Y + 2 * PAGE  # and the beginning of a page
+ROOM = PLANES * Y + PAGE + 23 * S  # these, `work`, and the beginning of a page
 
 
-def rooms(c, size):
-    """Scratch for one call of a pass over c columns: rows, `part`, and `size` numbers, all zero.
+@formula
+def page(room):
+    """Place of the first number of an array with which a page begins."""
+    return (0 - (address(room) >> 3)) & (PAGE - 1)
 
-    Stretches are computed whole, beyond the last column too: what lay in the memory before may be numbers so
-    small that a processor takes a hundred times as long for each.
+
+@helper
+def rooms(room):
+    """Rows, `part` and `work` in the room of one call."""
+    first = page(room)
+    end = first + 4 * ROW
+    return room[first:end], room[end : end + 4 * Y], room[end + 4 * Y :]
+
+
+@formula
+def clear(values, start, stop):
+    """Make numbers zero."""
+    for k in span(start, stop):
+        values[k] = 0.0
+
+
+@helper
+def clear_rooms(planes, part, work, width):
+    """Make zero what stretches read, being computed whole, before it is written.
+
+    What lay in the memory before may be numbers so small that a processor takes a hundred times as long for
+    each.
     """
-    room = np.empty(ROOM + size)
-    room = room[-(room.__array_interface__["data"][0] // 8) % PAGE :]
-    planes, rest = room[: PLANES * Y], room[PLANES * Y : PLANES * Y + size]
-    planes.reshape(PLANES, Y)[:, : min(c, WIDTH) + 2 * STRETCH] = 0.0
-    rest[:] = 0.0
-    return planes[: 4 * ROW], planes[4 * ROW :], rest
+    clear(work, 0, 23 * S)
+    end = FIRST + width + TOGETHER
+    for plane in range(0, planes.size, Y):
+        clear(planes, plane + FIRST + width, plane + end + 1)
+    for plane in range(0, part.size, Y):
+        clear(part, plane + FIRST, plane + end)
 
 
 @formula
@@ -300,17 +322,20 @@ def ask_to_write(values, begin):
 
 
 @kernel
-def _pass(points, size, beyond, beside, liu, Hn, H, normal, area, start, stop, planes, part, work, unwanted):
-    # No array is made or chosen inside the loops: counting who holds it would wait for all that is being
-    # written. An array of size 0 is a result that nobody wants.
-    c, rows = beyond.size // 6, points.size // size
+def _pass(points, size, c, beyond, beside, liu, Hn, H, normal, area, start, stop, room):
+    # An array of size 0 is a result that nobody wants.
+    planes, part, work = rooms(room)
+    rows, around, unwanted = points.size // size, beyond.size == 0, work[18 * S :]
     vectors, numbers, normals, areas = Hn.size > 0, H.size > 0, normal.size > 0, area.size > 0
     scale = RING_SCALE if liu else SCALE
     for begin in range(0, c, WIDTH):
         end = min(begin + WIDTH, c)
         o, p, q, fresh, far = 0, ROW, 2 * ROW, 3 * ROW, 0
+        clear_rooms(planes, part, work, end - begin)
         for i in range(start - 3, stop):
             ahead, wanted = min(i + 2, stop), i >= start  # the row that is loaded; whether there are results
+            if around:
+                ahead %= rows
             inside = 0 <= ahead < rows
             first = size * ahead if inside else 0 if ahead < 0 else 3 * c
             for left in range(begin, end, STRETCH):
@@ -377,16 +402,16 @@ def _pass(points, size, beyond, beside, liu, Hn, H, normal, area, start, stop, p
             o, p, q, fresh = p, q, fresh, o
 
 
-def grid_curvatures(points, size, beyond, beside, liu, Hn, H, normal, area, start, stop):
+def grid_curvatures(points, size, c, beyond, beside, liu, Hn, H, normal, area, start, stop):
     """Mean curvature normal, mean curvature, unit normal and dual area of the vertices of rows start..stop.
 
     Parameters
     ----------
     points : float64
         Vertices, row by row, rows `size` numbers apart.
-    size : int
+    size, c : int
     beyond : (6 c,) float64
-        The rows before the first one and after the last one.
+        The rows before the first one and after the last one; of size 0 where columns are closed, if rows are.
     beside : (6 (r + 2),) float64
         The columns before the first one and after the last one, those of the rows of `beyond` too. Of size 0
         where rows are closed.
@@ -398,6 +423,4 @@ def grid_curvatures(points, size, beyond, beside, liu, Hn, H, normal, area, star
         As these.
     start, stop : int
     """
-    planes, part, rest = rooms(beyond.size // 6, 21 * S)
-    work, unwanted = rest[: 18 * S], rest[18 * S :]
-    _pass(points, size, beyond, beside, liu, Hn, H, normal, area, start, stop, planes, part, work, unwanted)
+    _pass(points, size, c, beyond, beside, liu, Hn, H, normal, area, start, stop, np.empty(ROOM))
