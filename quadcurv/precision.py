@@ -11,6 +11,7 @@ from quadcurv.mesh import GridBlocks, Mesh, QuadGrid, QuadMesh, StaggeredGrid
 from quadcurv.types import Floats, Indices, PrecisionWarning, warn
 
 _SAMPLE = 512  # of the edges, whose lengths are looked at
+_FOUND = "rounding_error"  # where a mesh keeps what was found of it
 _NOTED = 0.01  # of the mean curvature
 
 
@@ -30,32 +31,44 @@ def rounding_error(mesh: Mesh | GridBlocks) -> tuple[float, float]:
     extent : float
         Largest side of the bounding box, in length; both are of a sample of the edges.
     """
+    if _FOUND not in mesh.__dict__:  # of a mesh, whose points do not change
+        mesh.__dict__[_FOUND] = _looked_for(mesh)
+    found: tuple[float, float] = mesh.__dict__[_FOUND]
+    return found
+
+
+def _looked_for(mesh: Mesh | GridBlocks) -> tuple[float, float]:
+    from quadcurv.kernels.extent import face_steps, grid_steps
+
     if isinstance(mesh, GridBlocks):
         begin, end = zip(*map(_ends, mesh), strict=True)
         return error_at_edges(np.concatenate(begin), np.concatenate(end), mesh.roundoff)
-    if is_on_device(_points(mesh)) or (isinstance(mesh, QuadGrid) and mesh.mask is not None):
+    points = _points(mesh)
+    if is_on_device(points) or (isinstance(mesh, QuadGrid) and mesh.mask is not None):
         return error_at_edges(*_ends(mesh), mesh.roundoff)
-    return _error(_points(mesh), *_edges(mesh), mesh.roundoff)
+    if isinstance(mesh, QuadMesh):
+        return _error(mesh.roundoff, *face_steps(points, mesh.faces, _every(len(mesh.faces))))
+    return _error(mesh.roundoff, *grid_steps(points, _every(points.shape[0] * points.shape[1])))
 
 
 def error_at_edges(begin: Floats, end: Floats, roundoff: float) -> tuple[float, float]:
     """The same of the ends (k, 3) of some edges, those at holes NaN."""
+    from quadcurv.kernels.extent import steps
+
     known = np.isfinite(begin).all(axis=1) & np.isfinite(end).all(axis=1)
     points = np.concatenate((begin[known], end[known]))
     first = np.arange(len(points) // 2)
-    return _error(points, first, first + first.size, roundoff)
+    return _error(roundoff, *steps(points, first, first + first.size))
 
 
-def _error(points: Floats, first: Indices, second: Indices, roundoff: float) -> tuple[float, float]:
-    """The same of edges between finite points with some numbers."""
-    from quadcurv.kernels import extent
-
-    square, far, size = extent.steps(points, first, second)
+def _error(roundoff: float, square: Floats, far: float, size: float) -> tuple[float, float]:
+    """The same of squares of edges, the largest coordinate, and the extent."""
     square = square[square > 0]
     if not square.size:
         return 0.0, 0.0
     short = square.size // 10
-    return 2 * roundoff * far / float(np.partition(square, short)[short]), size
+    square.partition(short)
+    return 2 * roundoff * far / float(square[short]), size
 
 
 def warn_of_rounding(mesh: Mesh | GridBlocks, H: Floats) -> None:
@@ -87,30 +100,29 @@ def warn_of_error(error: float, extent: float, roundoff: float, H: Floats) -> No
 
 def sample(r: int, c: int) -> tuple[Indices, Indices]:
     """Rows and columns of some vertices of a grid."""
-    i, j = np.divmod(np.arange(0, r * c, r * c // _SAMPLE + 1), c)
+    i, j = np.divmod(np.arange(0, r * c, _every(r * c)), c)
     return i, j
+
+
+def _every(number: int) -> int:
+    """One of how many is looked at."""
+    return number // _SAMPLE + 1
 
 
 def _points(mesh: Mesh) -> Any:
     return mesh.primal if isinstance(mesh, StaggeredGrid) else mesh.points
 
 
-def _edges(mesh: Mesh) -> tuple[Indices, Indices]:
-    """Numbers of the vertices at the ends of some edges."""
-    if isinstance(mesh, QuadMesh):
-        faces = mesh.faces[:: len(mesh.faces) // _SAMPLE + 1].astype(np.int64)
-        return faces[:, [0, 1]].ravel(), faces[:, [1, 2]].ravel()
-    r, c = _points(mesh).shape[:2]
-    i, j = sample(r, c)
-    first = i * c + j
-    first = np.concatenate((first - c * (i == r - 1), first - (j == c - 1)))
-    second = first + 1
-    second[: i.size] += c - 1
-    return first, second
-
-
 def _ends(mesh: Mesh) -> tuple[Floats, Floats]:
-    """Positions (k, 3) of these ends, in memory wherever the mesh is."""
-    x = _points(mesh).reshape(-1, 3)
-    first, second = _edges(mesh)
+    """Positions (k, 3) of the ends of some edges, in memory wherever the mesh is."""
+    x = _points(mesh)
+    if isinstance(mesh, QuadMesh):
+        faces = mesh.faces[:: _every(len(mesh.faces))]
+        first, second = faces[:, [0, 1]].ravel(), faces[:, [1, 2]].ravel()
+    else:
+        r, c = x.shape[:2]
+        i, j = sample(r, c)
+        first = np.concatenate((np.minimum(i, r - 2) * c + j, i * c + np.minimum(j, c - 2)))
+        second = first + np.repeat((c, 1), i.size)
+    x = x.reshape(-1, 3)
     return on_host(taken(x, first)), on_host(taken(x, second))

@@ -12,26 +12,27 @@ from numpy.typing import NDArray
 from quadcurv.boundary.closing import REACH, closed
 from quadcurv.mesh import QuadGrid, StaggeredGrid
 from quadcurv.stencils import Stencils, grid_faces
-from quadcurv.types import Bools, Indices, Ints
+from quadcurv.types import Bools, Floats, Indices, Ints
 
 _POINT = 1e-9  # distance of such points, in distances to the next row
 _LEAST = 3  # of such points: a quad with two corners at one place is no pole
 
 
-@np.errstate(all="ignore")
 def poles(grid: QuadGrid | StaggeredGrid) -> Indices | None:
     """The vertices of a grid, or corners of cells, that are at a pole: (r, c), the first one there, else -1.
 
     None if none is.
     """
-    from quadcurv.kernels import border
+    from quadcurv.kernels.border import all_apart
 
-    points = grid.points if isinstance(grid, QuadGrid) else grid.dual
     if isinstance(grid, QuadGrid) and grid.mask is not None:
         return None
-    apart = 4 * _POINT + 32 * grid.roundoff
-    if border.all_apart(points, grid.wrap, apart * apart):
-        return None
+    points, apart = grid.points if isinstance(grid, QuadGrid) else grid.dual, 4 * _POINT + 32 * grid.roundoff
+    return None if all_apart(points, grid.wrap, apart * apart) else _found(grid, points)
+
+
+@np.errstate(all="ignore")
+def _found(grid: QuadGrid | StaggeredGrid, points: Floats) -> Indices | None:
     found = None
     for axis in (0, 1):
         if grid.wrap[axis]:
@@ -78,7 +79,6 @@ def closed_grid(grid: QuadGrid, pole: Indices) -> tuple[Stencils, NDArray[np.uin
     return closed(*welded(grid, pole))
 
 
-@np.errstate(all="ignore")
 def parts_at_poles(grid: QuadGrid) -> list[tuple[Indices, QuadGrid, Bools]]:
     """Vertices of the rows near each pole, the grids of these, which of them are at or beside it."""
     near: list[tuple[Indices, QuadGrid, Bools]] = []

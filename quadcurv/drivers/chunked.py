@@ -16,7 +16,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from quadcurv.boundary import checked_boundary
-from quadcurv.drivers import DOUBLE
+from quadcurv.drivers import DOUBLE, answers
 from quadcurv.drivers.progress import tracked
 from quadcurv.drivers.targets import checked_out, targets
 from quadcurv.drivers.tasks import BORDER, Task, with_holes
@@ -85,10 +85,8 @@ class _Sample:
         i, j = self.i[inside], self.j[inside]
         begin, end = edges(window, i, j, shape)
         self.found.append((begin, end))
-        for name in ("mean_curvature", "mean_curvature_normal"):
-            if name in into:
-                self.H.append(into[name][i - a, j - c].ravel())
-                return
+        if (name := answers.telling(into)) is not None:
+            self.H.append(into[name][i - a, j - c].ravel())
 
     def warn(self, roundoff: float) -> None:
         """Say what rounding costs."""

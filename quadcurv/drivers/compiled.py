@@ -122,10 +122,11 @@ def evaluate_rows(
     if around is None and all(grid.wrap):
         around = _CLOSED
     kernel: Callable[..., None]
+    more: tuple[Floats, ...] = ()
     if isinstance(grid, QuadGrid):
         if around is None:
             around, unserved = frame(grid, boundary)
-        kernel, points, size, more = grid_curvatures, flat(grid.points), 3 * c, ()
+        kernel, points, size = grid_curvatures, flat(grid.points), 3 * c
     else:
         from quadcurv.kernels.cells import staggered_curvatures
 

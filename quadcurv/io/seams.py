@@ -51,6 +51,8 @@ def warn_of_open_sides(grid: QuadGrid | StaggeredGrid) -> None:
     if is_on_device(points) or (isinstance(grid, StaggeredGrid) and grid.has_ghosts):
         return
     open_ = [axis for axis in (0, 1) if not grid.wrap[axis] and _may_meet(points, axis)]
+    if not open_:
+        return
     gaps = {axis: gap for axis in open_ if (gap := _gap(points, axis)) <= SAME_PLACE * _extent(points)}
     if not gaps:
         return
@@ -67,8 +69,8 @@ def warn_of_open_sides(grid: QuadGrid | StaggeredGrid) -> None:
 def _may_meet(points: Floats, axis: int) -> bool:
     """Whether the first corner says no at once: the other side is farther from it than the next point."""
     others = (points[-1, 0], points[1, 0]) if axis == 0 else (points[0, -1], points[0, 1])
-    first, last, following = (x.tolist() for x in (points[0, 0], *others))
-    away, step = (max(abs(a - b) for a, b in zip(first, x, strict=True)) for x in (last, following))
+    (x, y, z), *ends = (point.tolist() for point in (points[0, 0], *others))
+    away, step = (max(abs(x - a), abs(y - b), abs(z - c)) for a, b, c in ends)
     return not away > step > 0  # NaN says nothing
 
 

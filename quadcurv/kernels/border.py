@@ -4,7 +4,7 @@ from math import inf, nan
 
 import numpy as np
 
-from quadcurv.kernels.compiled import flat, kernel
+from quadcurv.kernels.compiled import flat, helper, kernel
 from quadcurv.kernels.formulas import Carried, bits, formula, from_bits, span, where
 from quadcurv.kernels.vector import apart, cross, dot, larger, less, place, plus, smaller, times, triple
 
@@ -24,7 +24,7 @@ def continued(line):
     return (first[2] - first[1]) + (first[4] - first[3]), *first[3:]
 
 
-@formula(contract=True)
+@formula
 def continue_lines(
     points, first, along, inward, count, wraps, smooth, earlier, hidden, rounding, ghosts, to, excess, line
 ):
@@ -63,41 +63,55 @@ def continue_corner(ghosts, first, along, to):
     place(ghosts, to, 1, plus(x, [continued(numbers)[0] for numbers in zip(*line, strict=True)]))
 
 
-@kernel
-def _continue(points, sides, corners, smooth, earlier, hidden, rounding, ghosts, excess):
-    for k in range(0, sides.size, 7):
-        first, along, inward, count, wraps = sides[k], sides[k + 1], sides[k + 2], sides[k + 3], sides[k + 4]
-        to, line = sides[k + 5], sides[k + 6]
-        continue_lines(
-            points,
-            first,
-            along,
-            inward,
-            count,
-            wraps,
-            smooth,
-            earlier,
-            hidden,
-            rounding,
-            ghosts,
-            to,
-            excess,
-            line,
-        )
-    for k in range(0, corners.size, 3):
-        continue_corner(ghosts, corners[k], corners[k + 1], corners[k + 2])
+@helper
+def side(r, c, axis, end):
+    """Of a side of a grid, in numbers of its points: the first, the way to the next line and along a line.
 
-
-def open_sides(shape, wrap):
-    """Of each open side of a grid: axis and end, then, of numbers of its points, first, along and inward.
-
-    The last two are the way from line to line, and along a line.
+    Then how many lines there are.
     """
-    r, c = shape
-    for axis, depth, along, inward in ((0, r, 3, 3 * c), (1, c, 3 * c, 3)):
-        if not wrap[axis]:
-            yield axis, 0, 0, along, inward
-            yield axis, 1, inward * (depth - 1), along, -inward
+    along, inward, depth, count = (3, 3 * c, r, c) if axis == 0 else (3 * c, 3, c, r)
+    return (inward * (depth - 1), along, -inward, count) if end == 1 else (0, along, inward, count)
+
+
+@kernel
+def _continue(points, r, c, closed, wraps, smooth, earlier, hidden, rounding, ghosts, excess):
+    # Of axis 0 whether it is `closed`, of axis 1 whether it `wraps`.
+    for k in range(ghosts.size):
+        ghosts[k] = nan
+    for axis in range(2):
+        other, depth = (wraps, r) if axis == 0 else (closed, c)
+        for end in range(2):
+            first, along, inward, count = side(r, c, axis, end)
+            to, line = (
+                (3 * c * end, c * end) if axis == 0 else (6 * c + 3 * (r + 2) * end + 3, 2 * c + r * end)
+            )
+            open_ = (closed if axis == 0 else wraps) == 0
+            if open_ and depth >= 6:
+                continue_lines(
+                    points,
+                    first,
+                    along,
+                    inward,
+                    count,
+                    other,
+                    smooth,
+                    earlier,
+                    hidden,
+                    rounding,
+                    ghosts,
+                    to,
+                    excess,
+                    line,
+                )
+            else:
+                for k in range(count):
+                    excess[line + k] = inf if open_ else -inf
+    if wraps == 0 and closed == 0 and c > 4:  # lines of ghosts before the first and after the last row
+        for end in range(2):
+            first, _, inward, _ = side(r, c, 1, end)
+            to = 6 * c + 3 * (r + 2) * end
+            continue_corner(ghosts, first, inward, to)
+            continue_corner(ghosts, 3 * c + first, inward, to + 3 * (r + 1))
 
 
 def continue_sides(points, wrap, limits):
@@ -122,26 +136,14 @@ def continue_sides(points, wrap, limits):
         Line by line in the same order: the square of what the sixth point changes, less the most that it
         may; infinite where the ghost does not lie outside, -infinite where there are no lines.
     """
-    (r, c, _), lines = points.shape, (2 * points.shape[1], 2 * points.shape[0])
-    excess = np.full(sum(lines), -inf)
-    ghosts = np.full(6 * c + (0 if wrap[1] else 6 * (r + 2)), nan)
+    r, c, _ = points.shape
+    excess, ghosts = np.empty(2 * (r + c)), np.empty(6 * c + (0 if wrap[1] else 6 * (r + 2)))
     beyond, beside = ghosts[: 6 * c].reshape(2, c, 3), ghosts[6 * c :].reshape(2, -1, 3)
-    sides, corners = [], []
-    for axis, end, first, along, inward in open_sides((r, c), wrap):
-        count = lines[axis] // 2
-        to, line = (3 * c * end, c * end) if axis == 0 else (6 * c + 3 * (r + 2) * end + 3, 2 * c + r * end)
-        if points.shape[axis] < 6:
-            excess[line : line + count] = inf
-        else:
-            sides += [first, along, inward, count, wrap[1 - axis], to, line]
-        if axis == 1 and c > 4 and not wrap[0]:  # lines of ghosts before the first and after the last row
-            corners += [first, inward, to - 3, 3 * c + first, inward, to + 3 * r]
+    _continue(flat(points), r, c, int(wrap[0]), int(wrap[1]), *limits, ghosts, excess)
     if wrap[0]:
         beyond[:] = points[-1], points[0]
-    tables = np.array(sides, np.int64), np.array(corners, np.int64)
-    _continue(flat(points), *tables, *limits, ghosts, excess)
-    if wrap[0] and not wrap[1]:
-        beside[:, 0], beside[:, -1] = beside[:, -2], beside[:, 1]
+        if not wrap[1]:
+            beside[:, 0], beside[:, -1] = beside[:, -2], beside[:, 1]
     return beyond, beside, excess
 
 
@@ -163,11 +165,13 @@ def crowded(points, first, along, inward, count, wraps, tolerance):
 
 
 @kernel
-def _crowded(points, sides, tolerance):
+def _crowded(points, r, c, closed, wraps, tolerance):
     number = 0
-    for k in range(0, sides.size, 5):
-        first, along, inward, count, wraps = sides[k], sides[k + 1], sides[k + 2], sides[k + 3], sides[k + 4]
-        number += crowded(points, first, along, inward, count, wraps, tolerance)
+    for axis in range(2):
+        of_axis, other = (closed, wraps) if axis == 0 else (wraps, closed)
+        for end in range(2 if of_axis == 0 else 0):
+            first, along, inward, count = side(r, c, axis, end)
+            number += crowded(points, first, along, inward, count, other, tolerance)
     return number
 
 
@@ -176,8 +180,5 @@ def all_apart(points, wrap, tolerance):
 
     `tolerance` is the least square of their distance, in squares of the coordinates there.
     """
-    sides = [
-        (first, along, inward, points.shape[1 - axis], wrap[1 - axis])
-        for axis, _, first, along, inward in open_sides(points.shape[:2], wrap)
-    ]
-    return not sides or _crowded(flat(points), np.array(sides, np.int64).reshape(-1), tolerance) == 0
+    r, c, _ = points.shape
+    return _crowded(flat(points), r, c, int(wrap[0]), int(wrap[1]), tolerance) == 0

@@ -6,38 +6,34 @@ import numpy as np
 
 from quadcurv.kernels import ranges
 from quadcurv.kernels.compiled import flat, kernel
-from quadcurv.kernels.formulas import Carried, bits, formula, span, where
+from quadcurv.kernels.formulas import Carried, bits, formula, from_bits, span, where
 from quadcurv.kernels.vector import dot, larger, less, smaller, triple
 
 _MAGNITUDE = 2**63 - 1  # all bits but that of the sign
 
 
 @formula
-def largest_bits(values, start, stop):
-    """Largest of the bits of magnitudes: those of NaN and of infinity are larger than all others."""
+def largest_of(values, start, stop):
+    """Largest magnitude, by its bits: those of NaN and of infinity are larger than all others."""
     most = Carried((0,))
     for k in span(start, stop, 4):
         magnitude, (before,) = bits(values[k]) & _MAGNITUDE, most.get()
         most.set((where(magnitude > before, magnitude, before),))
-    return most.get()[0]
+    return from_bits(most.get()[0])
 
 
 @kernel
-def _largest(values, start, stop, found, at):
-    found[at] = largest_bits(values, start, stop)
+def _largest(values, start, stop):
+    return largest_of(values, start, stop)
 
 
 def largest(values):
     """Largest magnitude in a float64 array, 0 of none: NaN if there is one, else infinity if there is one."""
     values, found = flat(values), []
-
-    def look(start: int, stop: int) -> None:
-        part = np.empty(1, np.int64)
-        _largest(values, start, stop, part, 0)
-        found.append(part)
-
-    ranges.over(look, values.size, values.size // 3)
-    return float(np.max(found, initial=0).astype(np.int64).reshape(1).view(np.float64)[0])
+    ranges.over(
+        lambda start, stop: found.append(_largest(values, start, stop)), values.size, values.size // 3
+    )
+    return found[0] if len(found) == 1 else float(np.max(found))
 
 
 @formula
@@ -72,3 +68,39 @@ def steps(points, first, second):
     """
     square = np.empty(first.size)
     return square, *_steps(flat(points), flat(first), flat(second), square)
+
+
+@kernel
+def _grid_steps(points, r, c, every, first, second, square):
+    number = square.size // 2
+    for k in range(number):
+        i, j = every * k // c, every * k % c
+        across, along = first[k], first[number + k] = c * min(i, r - 2) + j, c * i + min(j, c - 2)
+        second[k], second[number + k] = across + c, along + 1
+    return measured(points, first, second, square)
+
+
+def grid_steps(points, every):
+    """As `steps`, from points (r, c, 3) of a grid to those in the next row and column, one of so many."""
+    r, c, _ = points.shape
+    square, (first, second) = (
+        np.empty(2 * -(-r * c // every)),
+        np.empty((2, 2 * -(-r * c // every)), np.int64),
+    )
+    return square, *_grid_steps(flat(points), r, c, every, first, second, square)
+
+
+@kernel
+def _face_steps(points, faces, every, first, second, square):
+    for k in range(square.size // 2):
+        corner = 4 * every * k
+        first[2 * k], first[2 * k + 1] = faces[corner], faces[corner + 1]
+        second[2 * k], second[2 * k + 1] = faces[corner + 1], faces[corner + 2]
+    return measured(points, first, second, square)
+
+
+def face_steps(points, faces, every):
+    """As `steps`, along the first two edges of one of so many faces (m, 4)."""
+    number = 2 * -(-len(faces) // every)
+    square, (first, second) = np.empty(number), np.empty((2, number), np.int64)
+    return square, *_face_steps(flat(points), flat(faces), every, first, second, square)
