@@ -9,7 +9,6 @@ import os
 from pathlib import Path
 from typing import Any, NamedTuple
 from urllib.parse import quote
-from xml.sax.saxutils import quoteattr
 
 import numpy as np
 from numpy.typing import NDArray
@@ -60,6 +59,8 @@ class Appended:
 
 
 def _attribute(name: str) -> str:
+    from xml.sax.saxutils import quoteattr  # which imports all that fetches files from elsewhere
+
     return quoteattr(_checked(name))
 
 

@@ -12,7 +12,7 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from scipy.special import stdtrit
+import scipy
 
 from quadcurv.schemes import averaged
 from quadcurv.schemes.base import Curvatures, Neighbourhoods, StandardErrors
@@ -110,7 +110,7 @@ class _Found:
         """(k, 4): half of intervals that hold the exact values in 95 % of cases."""
         gain = self.values[at, self.kernel.GAIN : self.kernel.GAIN + 4]
         freedom, places = np.unique(self.freedom[at], return_inverse=True)  # they are few
-        noise = stdtrit(freedom, _QUANTILE)[places, None] * gain * self.sigma[at, None]
+        noise = scipy.special.stdtrit(freedom, _QUANTILE)[places, None] * gain * self.sigma[at, None]
         return np.hypot(np.nan_to_num(noise), 2 * self.bias[at])
 
     def doubt(self, at: Indices, rounding: float) -> Floats:
