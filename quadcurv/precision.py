@@ -122,7 +122,8 @@ def _ends(mesh: Mesh) -> tuple[Floats, Floats]:
     else:
         r, c = x.shape[:2]
         i, j = sample(r, c)
-        first = np.concatenate((np.minimum(i, r - 2) * c + j, i * c + np.minimum(j, c - 2)))
-        second = first + np.repeat((c, 1), i.size)
+        above, left = np.clip(i, 0, max(r - 2, 0)), np.clip(j, 0, max(c - 2, 0))
+        first = np.concatenate((above * c + j, i * c + left))
+        second = np.concatenate((np.minimum(above + 1, r - 1) * c + j, i * c + np.minimum(left + 1, c - 1)))
     x = x.reshape(-1, 3)
     return on_host(taken(x, first)), on_host(taken(x, second))

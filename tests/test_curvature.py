@@ -243,6 +243,18 @@ def test_the_stated_error_of_rounding_is_that_of_rounding(name, dtype, offset):
     assert stated / 20 < error < 6 * stated  # at borders fitted surfaces magnify it
 
 
+@pytest.mark.parametrize("shape", [(1, 5), (5, 1)])
+def test_rounding_of_a_single_row_of_cells_is_that_of_its_edges(shape):
+    rng = np.random.default_rng(0)
+    primal, dual = rng.normal(size=(*shape, 3)), rng.normal(size=(shape[0] + 1, shape[1] + 1, 3))
+    cells = StaggeredGrid(primal, dual)
+    points = primal.reshape(-1, 3)
+    shortest = np.linalg.norm(np.diff(points, axis=0), axis=1).min()
+    error, extent = rounding_error(cells)
+    assert error == pytest.approx(2 * cells.roundoff * np.abs(points).max() / shortest**2)
+    assert extent == pytest.approx(np.ptp(points, axis=0).max())
+
+
 def test_rounding_that_shows_is_warned_of():
     grid = surfaces.sphere().sample((400, 200))[0]
     far = QuadGrid((grid.points + 20).astype(np.float32), grid.wrap)

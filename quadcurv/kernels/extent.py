@@ -75,18 +75,18 @@ def _grid_steps(points, r, c, every, first, second, square):
     number = square.size // 2
     for k in range(number):
         i, j = every * k // c, every * k % c
-        across, along = first[k], first[number + k] = c * min(i, r - 2) + j, c * i + min(j, c - 2)
-        second[k], second[number + k] = across + c, along + 1
+        # Of a single row or column these steps end where they begin.
+        above, left = max(0, min(i, r - 2)), max(0, min(j, c - 2))
+        first[k], first[number + k] = c * above + j, c * i + left
+        second[k], second[number + k] = c * min(above + 1, r - 1) + j, c * i + min(left + 1, c - 1)
     return measured(points, first, second, square)
 
 
 def grid_steps(points, every):
     """As `steps`, from points (r, c, 3) of a grid to those in the next row and column, one of so many."""
     r, c, _ = points.shape
-    square, (first, second) = (
-        np.empty(2 * -(-r * c // every)),
-        np.empty((2, 2 * -(-r * c // every)), np.int64),
-    )
+    number = 2 * -(-r * c // every)
+    square, (first, second) = np.empty(number), np.empty((2, number), np.int64)
     return square, *_grid_steps(flat(points), r, c, every, first, second, square)
 
 
