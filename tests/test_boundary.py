@@ -419,7 +419,7 @@ def test_layers_need_points():
 
 
 def test_fitted_surfaces_are_weighted_least_squares(rng):
-    """Eight at a time and alone: coefficients, noise, and its gains, as numpy's own least squares have them."""
+    """Eight at a time and alone: coefficients, noise and its gain are those of numpy's least squares."""
     from quadcurv.kernels import nearby, surfaces, topology
 
     uv, faces = square(5)

@@ -161,7 +161,7 @@ def test_the_time_grows_with_the_valence_not_with_its_square(scheme):
     ("scheme", "seconds"), [("finite_volume", 10), ("liu", 10), ("bunge", 10), ("jet", 40)]
 )
 def test_valence_of_a_hundred_thousand(scheme, seconds):
-    """Its border has as many vertices, each closed by a surface of its own: 3 to 4 and 15 s on quiet cores."""
+    """Its border has as many vertices, each closed by a surface of its own: 3 to 4 s and 15 s."""
     begin = time.process_time()
     H = qc.mean_curvature(fan(100_000), scheme)
     assert time.process_time() - begin < seconds

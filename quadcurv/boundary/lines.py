@@ -100,6 +100,9 @@ def extended(lines: Floats, turn: Floats, degree: int, layers: int, beside: Indi
         steps = _beyond(s, 0)[:, None] - s
         terms = np.stack([table[:, k] * np.prod(steps[:, :k], axis=1) for k in (1, 2, 3, 4, 5)])
         by_length = continued(x[:, : degree + 1], layers, ~every)
+        for few in range(LEAST, degree + 1):  # points in place of missing ones are on polynomials by index
+            rows = number == few
+            by_length[rows] = continued(x[rows, :few], layers, ~every[rows])
         other, smooth = _error(terms, by_length, ends, degree)
         by_index = even | (~smooth & (error <= other))
         ghosts = np.where(by_index[:, None, None], ghosts, by_length)

@@ -1,9 +1,10 @@
 """Rings at the border closed by points of a surface fitted at the vertex.
 
-The fan of faces is completed by its mirror image through the vertex, in the tangent plane: as the other
-side of a regular vertex looks. Where that leaves a wide gap, edges are put between; ghosts lie on the
-fitted surface. A fan that leaves no room, or has a face of no width, is not used: four quads on the surface
-take its place.
+A fan of quads, or of three triangles, is completed by its mirror image through the vertex, in the tangent
+plane: as the other side of a regular vertex looks. Where that leaves a wide gap, edges are put between; the
+ghosts lie on the fitted surface. Four quads on the surface, of the same area, take the place of other fans of
+triangles, on whose rings Laplacians are off by a part of the curvature however small they are; and smaller
+ones that of a fan that leaves no room or has a face of no width.
 """
 
 from __future__ import annotations
@@ -14,14 +15,14 @@ import numpy as np
 
 from quadcurv.boundary.surface import Surfaces
 from quadcurv.stencils import Stencils
-from quadcurv.types import Bools, Floats, Indices, Ints
+from quadcurv.types import Floats, Indices, Ints
 
 _NARROW = np.radians(10)  # a gap less than that leaves no room for a face
 _THIN = 1e-3  # an angle less than that, or less from straight, is a face of no width
 _BENT = 0.1  # how far a ghost quad may be from a parallelogram, in sums of its edges
-# Which edges of so many quads, or triangles, have mirror images that make them four, or six.
+# Which edges of so many quads, or of three triangles, have mirror images that make them four, or six.
 _QUADS = {1: (1, 1), 2: (0, 1, 0), 3: (0, 0, 0, 0)}
-_TRIANGLES = {1: (1, 1), 2: (1, 1, 1), 3: (0, 1, 1, 0), 4: (0, 0, 1, 0, 0), 5: (0, 0, 0, 0, 0, 0)}
+_TRIANGLES = {3: (0, 1, 1, 0)}
 
 
 class Fans(NamedTuple):
@@ -86,26 +87,29 @@ def stars(stencils: Stencils, fan: Fans, surfaces: Surfaces) -> list[tuple[Indic
     corner = np.diff(angle, axis=1) % (2 * np.pi)
     total = corner.sum(axis=1)
     sound = ((corner > _THIN) & (corner < np.pi - _THIN)).all(axis=1) & (total < 2 * np.pi - _NARROW)
-    k, quads = corner.shape[1], fan.across >= 0
+    k, quads = corner.shape[1], (fan.across >= 0).all(axis=1)
+    regular = quads | ((k == 3) & (fan.across < 0).all(axis=1))
     gap = 2 * np.pi - total
     # Mirror images of the edges, by their angle from the last one, that stand free in the gap.
-    right = np.where(quads.sum(axis=1) * 2 >= k, np.pi / 2, np.pi / 3)
+    right = np.where(quads, np.pi / 2, np.pi / 3)
     offset = (angle + np.pi - angle[:, -1:]) % (2 * np.pi)
     free = np.minimum(total / k, right)[:, None] / 2
     kept = (offset >= free) & (offset <= gap[:, None] - free)
     widest = 1.5 * right
-    for lattice, alike in ((_QUADS, quads.all(axis=1)), (_TRIANGLES, ~quads.any(axis=1))):
+    for lattice, alike in ((_QUADS, quads), (_TRIANGLES, ~quads & regular)):
         if k in lattice:  # if these are what is missing, however skew
             mirrored = np.array(lattice[k], bool)
             step = _steps(offset[:, mirrored], gap)
-            alike &= ((step > _NARROW) & (step < np.pi - _NARROW)).all(axis=1)
+            alike = alike & ((step > _NARROW) & (step < np.pi - _NARROW)).all(axis=1)
             kept[alike] = mirrored
-            widest[alike & ((k > 1) | quads[:, 0])] = np.pi
+            widest[alike] = np.pi
 
     found = []
-    for rows in _alike(np.column_stack((kept, right, widest, sound, quads, fan.slot % 2))):
-        if not sound[rows[0]]:
-            found.append((rows, regular_stars(stencils, surfaces.of(rows))))
+    for rows in _alike(np.column_stack((kept, right, widest, sound, regular, fan.slot % 2))):
+        if not (sound & regular)[rows[0]]:
+            own = stencils, fan.of(rows), edges[rows], surfaces.of(rows), total[rows]
+            axes = _axes(*own) if sound[rows[0]] else None
+            found.append((rows, regular_stars(stencils, surfaces.of(rows), axes)))
             continue
         mirrored = kept[rows[0]]
         step = _steps(offset[rows][:, mirrored], gap[rows])
@@ -120,6 +124,29 @@ def stars(stencils: Stencils, fan: Fans, surfaces: Surfaces) -> list[tuple[Indic
             at = rows[some]
             found.append((at, _star(stencils, fan.of(at), surfaces.of(at), ghosts[:, 1:-1])))
     return found
+
+
+def _axes(stencils: Stencils, fan: Fans, edges: Floats, surfaces: Surfaces, total: Floats) -> Floats:
+    """Edges (n, 2, 2) of four quads, of the area that fans have when completed, where triangles count twice.
+
+    Along a side as long as the fan's, at a corner like its two sides, else squares.
+    """
+    across = surfaces.flat(stencils.points[fan.across])
+    a, b = edges[:, :-1], edges[:, 1:]
+    area = np.where(fan.across < 0, 2 * _cross(a, b), _cross(a, across) + _cross(across, b)).sum(axis=1) / 2
+    area = np.maximum(area, 0.0) * 2 * np.pi / total / 4
+    along = (edges[:, 0] - edges[:, -1]) / 2
+    turned = np.stack((-along[:, 1], along[:, 0]), axis=1)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        side = np.stack((along, turned * (area / (along * along).sum(axis=1))[:, None]), axis=1)
+        corner = edges[:, [0, -1]] * np.sqrt(area / _cross(edges[:, 0], edges[:, -1]))[:, None, None]
+    square = np.sqrt(area)[:, None, None] * np.eye(2)
+    straight = np.abs(total - np.pi) < np.pi / 4
+    return np.where(straight[:, None, None], side, np.where((total < np.pi)[:, None, None], corner, square))
+
+
+def _cross(a: Floats, b: Floats) -> Floats:
+    return a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0]
 
 
 def _steps(offset: Floats, gap: Floats) -> Floats:
@@ -147,35 +174,33 @@ def _star(stencils: Stencils, fan: Fans, surfaces: Surfaces, ghosts: Floats) -> 
     """Faces of fans that all look alike, and of the ghosts (n, g, 2) that close them."""
     k = fan.across.shape[1]
     edges, across = (surfaces.flat(stencils.points[x]) for x in (fan.edges, fan.across))
-    quad = fan.across[0] >= 0
-    as_quads = 2 * quad.sum() >= k
+    as_quads = fan.across[0, 0] >= 0
     ring = np.concatenate((edges[:, -1:], ghosts, edges[:, :1]), axis=1)
     beyond = ring[:, :-1] + ring[:, 1:]
     if as_quads:
-        twist, parity = _twists(edges, across, quad, fan.slot, ring)
+        twist, parity = _twists(edges, across, fan.slot, ring)
         beyond += twist
-    outer = edges[:, :-1] + edges[:, 1:]
-    local = np.concatenate((ghosts, beyond, outer[:, ~quad]), axis=1)
+    outer = np.empty((len(edges), 0, 2)) if as_quads else edges[:, :-1] + edges[:, 1:]
+    local = np.concatenate((ghosts, beyond, outer), axis=1)
     lifted = surfaces.lifted(local)
 
     # Columns: the vertex, its edge neighbours, the vertices across its quads, the ghosts.
     own = [
         stencils.points[fan.vertex][:, None],
         stencils.points[fan.edges],
-        stencils.points[fan.across][:, quad],
+        stencils.points[fan.across if as_quads else fan.across[:, :0]],
     ]
     points = np.concatenate((*own, lifted), axis=1)
-    first = k + 2 + int(quad.sum())
+    first = k + 2 + as_quads * k
     g = ghosts.shape[1]
     a = np.concatenate(([k + 1], first + np.arange(g), [1]))
     d = first + g + np.arange(g + 1)
     faces: list[Any] = []
-    number, flap = iter(range(k + 2, first)), iter(range(first + 2 * g + 1, points.shape[1]))
     for i in range(k):
-        if quad[i]:
-            faces.append(np.roll((0, 1 + i, next(number), 2 + i), fan.slot[0, i]))
+        if as_quads:
+            faces.append(np.roll((0, 1 + i, k + 2 + i, 2 + i), fan.slot[0, i]))
         else:
-            faces += [(0, 1 + i, 2 + i, -1), (2 + i, 1 + i, next(flap), -1)]
+            faces += [(0, 1 + i, 2 + i, -1), (2 + i, 1 + i, first + 2 * g + 1 + i, -1)]
     for i in range(g + 1):
         if as_quads:
             faces.append(np.roll((0, a[i], d[i], a[i + 1]), parity[i]))
@@ -184,9 +209,7 @@ def _star(stencils: Stencils, fan: Fans, surfaces: Surfaces, ghosts: Floats) -> 
     return _numbered(points, np.array(faces))
 
 
-def _twists(
-    edges: Floats, across: Floats, quad: Bools, slot: Indices, ring: Floats
-) -> tuple[Floats, list[int]]:
+def _twists(edges: Floats, across: Floats, slot: Indices, ring: Floats) -> tuple[Floats, list[int]]:
     """What ghost quads have beyond a parallelogram (n, g + 1, 2), and where they begin.
 
     As the opposite quad has it, for x y is the same there; less than that a quarter of a turn away.
@@ -205,7 +228,6 @@ def _twists(
         face = (at[..., None] >= fan[:, None, 1:]).sum(axis=2)
         met = face < k
         face = np.minimum(face, k - 1)
-        met &= quad[face]
         twist = np.where(met[..., None], sign * np.take_along_axis(bend, face[..., None], axis=1), twist)
         for j in np.flatnonzero(met[0]):
             parity[j] = int(slot[0, face[0, j]] + (sign < 0)) % 2
@@ -220,14 +242,15 @@ def bent(twist: Floats, a: Floats, b: Floats) -> Floats:
     return twist * np.divide(most, size, out=np.ones_like(size), where=size > most)[..., None]
 
 
-def regular_stars(stencils: Stencils, surfaces: Surfaces) -> Stars:
-    """Four quads on each surface, with edges half as long as the distance of the first ring."""
-    first = surfaces.ring == 1
-    near = surfaces.flat(stencils.points[surfaces.around])
-    size = np.linalg.norm(near, axis=2).sum(axis=1, where=first) / np.maximum(first.sum(axis=1), 1)
+def regular_stars(stencils: Stencils, surfaces: Surfaces, axes: Floats | None = None) -> Stars:
+    """Four quads on each surface, with edges (n, 2, 2), or half as long as the distance of the first ring."""
+    if axes is None:  # the smaller they are the less a scheme is off; noise is in the surface already
+        first = surfaces.ring == 1
+        near = surfaces.flat(stencils.points[surfaces.around])
+        size = np.linalg.norm(near, axis=2).sum(axis=1, where=first) / np.maximum(first.sum(axis=1), 1)
+        axes = size[:, None, None] / 2 * np.eye(2)
     x, y = np.meshgrid([-1.0, 0, 1], [-1.0, 0, 1], indexing="ij")
-    # The smaller they are the less a scheme is off; noise is in the surface already.
-    local = size[:, None, None] / 2 * np.stack((x.ravel(), y.ravel()), axis=1)
+    local = np.stack((x.ravel(), y.ravel()), axis=1) @ axes
     points = surfaces.lifted(local)[:, [4, 0, 1, 2, 3, 5, 6, 7, 8]]
     points[:, 0] = surfaces.points
     index = np.array([[1, 2, 3], [4, 0, 5], [6, 7, 8]])
