@@ -19,6 +19,7 @@ _FINDINGS = {
     "collapsed": "face(s) with a repeated vertex, taken without the repetition",
     "dropped": "face(s) of fewer than three distinct vertices, left out",
     "double": "face(s) given twice, taken once",
+    "hanging": "vertices on an edge between two others, in one of its faces: left out, without curvature",
     "turned": "face(s) turned to agree with their neighbours",
     "masked": "point(s) without a position, taken as holes",
     "nonmanifold": "edge(s) with more than two faces, whose ends have no curvature",
@@ -28,7 +29,7 @@ _FINDINGS = {
     "inside_out": "the mesh is closed and inside out: its normals point inward",
     "non_orientable": "the mesh is non-orientable: its mean curvature has no sign, |H| is given",
 }
-_WARNED = ("collapsed", "dropped", "double", "turned", "masked", "nonmanifold", "non_orientable")
+_WARNED = ("collapsed", "dropped", "double", "hanging", "turned", "masked", "nonmanifold", "non_orientable")
 
 
 class Finding(NamedTuple):
@@ -51,7 +52,7 @@ class Report:
     Attributes
     ----------
     findings : tuple of Finding
-        Of the kinds "collapsed", "dropped", "double", "turned" and "masked", which were mended;
+        Of the kinds "collapsed", "dropped", "double", "hanging", "turned" and "masked", which were mended;
         "nonmanifold", "fans" and "isolated", whose vertices are NaN; "cut", "inside_out" and
         "non_orientable".
     """

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from quadcurv.checks import Finding, GivenFaces, checked_faces
 from quadcurv.device_arrays import as_cupy
+from quadcurv.hanging import without_hanging
 from quadcurv.polygons import cut
 from quadcurv.stencils import Polygons, edges, face_pairs
 from quadcurv.types import Bools, Floats, Indices, Ints
@@ -123,7 +124,7 @@ def connect(faces: Any, points: Floats, turn: Bools | None = None) -> Connectivi
     """
     from quadcurv.kernels import topology
 
-    given = checked_faces(faces, len(points))
+    given = without_hanging(checked_faces(faces, len(points)), points)
     findings = list(given.findings)
     table, source, polygons = _without_polygons(given, points)
     n = len(points)
@@ -163,8 +164,9 @@ def connect(faces: Any, points: Floats, turn: Bools | None = None) -> Connectivi
     if several.size:
         findings.append(Finding("fans", several.size, f"vertex {several[0]}"))
     isolated = np.flatnonzero(kind == topology.ISOLATED)
-    if isolated.size:
-        findings.append(Finding("isolated", isolated.size, f"vertex {isolated[0]}"))
+    hanging = sum(finding.number for finding in findings if finding.kind == "hanging")
+    if isolated.size > hanging:
+        findings.append(Finding("isolated", isolated.size - hanging, f"vertex {isolated[0]}"))
     if not orientable:
         findings.append(Finding("non_orientable", 1, ""))
     for array in (table, kind, ring, others):

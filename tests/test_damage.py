@@ -98,6 +98,39 @@ def test_a_collapsed_quad_is_the_triangle(scheme):
         np.testing.assert_allclose(H, qc.mean_curvature((points, as_triangle), scheme), rtol=1e-12)
 
 
+@every_scheme
+@pytest.mark.parametrize("nodes", [1, 2])
+def test_a_vertex_that_hangs_on_an_edge_changes_nothing(scheme, nodes):
+    """In one of the two faces at the edge, on the chord: not on the surface, and behind it there was a crack."""
+    points, faces, _ = sphere(6)
+    whole = qc.mean_curvature((points, faces), scheme)
+    (a, b, *_), n = faces[20], len(points)
+    t = np.arange(1, nodes + 1)[:, None] / (nodes + 1)
+    points = np.vstack((points, (1 - t) * points[a] + t * points[b]))
+    spelled = [*faces[:20], [a, *range(n, n + nodes), *faces[20][1:]], *faces[21:]]
+    match = rf"{nodes} vertices on an edge between two others, .* first vertex {n}"
+    with pytest.warns(MeshWarning, match=match):
+        mesh = QuadMesh(points, spelled)
+    assert [(f.kind, f.number) for f in mesh.report.findings] == [("hanging", nodes)]
+    assert mesh.face_source.tolist() == list(range(len(faces)))
+    H = qc.mean_curvature(mesh, scheme)
+    assert np.isnan(H[n:]).all()
+    np.testing.assert_array_equal(H[:n], whole)
+
+
+def test_corners_of_one_polygon_that_hang_on_no_edge_stay():
+    """At a true border, and off the chord: nobody knows that these are not on the surface."""
+    points, faces, _ = sphere(6)
+    (a, b, *rest), n = faces[20], len(points)
+    whole = [*faces[:20], [a, n, b, *rest], *faces[21:]]
+    beside = next(k for k, f in enumerate(faces) if k != 20 and {a, b} <= set(f))
+    middle = (points[a] + points[b]) / 2
+    for x, given in ((middle, np.delete(np.array(whole, object), beside)), (1.001 * middle, whole)):
+        mesh = QuadMesh(np.vstack((points, x)), [list(face) for face in given])
+        assert mesh.report["hanging"] == 0
+        assert mesh.report["cut"] == 1
+
+
 def test_the_warning_comes_once_and_the_report_keeps_all():
     points, faces, _ = sphere(6)
     damaged = [*faces, faces[3], [0, 0, 1, 1]]

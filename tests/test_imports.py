@@ -21,6 +21,7 @@ FLOORS = [
     ["kernels", "ragged"],
     ["coincidence", "polygons", "stencils"],
     ["checks"],
+    ["hanging"],
     ["connectivity"],
     ["mesh"],
     ["boundary", "io", "precision"],
