@@ -101,7 +101,7 @@ def test_a_collapsed_quad_is_the_triangle(scheme):
 @every_scheme
 @pytest.mark.parametrize("nodes", [1, 2])
 def test_a_vertex_that_hangs_on_an_edge_changes_nothing(scheme, nodes):
-    """In one of the two faces at the edge, on the chord: not on the surface, and behind it there was a crack."""
+    """In one of the two faces at the edge, on the chord: not on the surface, before a crack."""
     points, faces, _ = sphere(6)
     whole = qc.mean_curvature((points, faces), scheme)
     (a, b, *_), n = faces[20], len(points)

@@ -13,7 +13,8 @@ ghosts, close it. With boundary="extrapolate" they come, in this order of prefer
 
 Where a strip is neither clearly smooth nor clearly rough the way of the least estimated error is taken.
 Open stay, and have no curvature: isolated vertices, those of several fans of faces or of an edge of more
-than two, and those whose neighbours are too few for a surface, or leave it undetermined by half an edge.
+than two, and those whose neighbours are too few for a surface, or leave it undetermined by half an edge, or
+are far within a strip of faces one wide, whose points tell nothing across it.
 """
 
 from __future__ import annotations
@@ -30,7 +31,7 @@ from quadcurv.boundary.poles import closed_grid, parts_at_poles, poles, welded
 from quadcurv.boundary.sides import frame, ghost_layer, part_around
 from quadcurv.boundary.strips import ghosts
 from quadcurv.boundary.strips import roughness as rough_lines
-from quadcurv.boundary.surface import Surfaces, fitted
+from quadcurv.boundary.surface import Surfaces, fitted, wide
 from quadcurv.mesh import Mesh, QuadGrid, StaggeredGrid
 from quadcurv.stencils import Stencils
 from quadcurv.types import Floats
@@ -61,6 +62,7 @@ __all__ = [
     "poles",
     "roughness",
     "welded",
+    "wide",
 ]
 
 BOUNDARIES = ("extrapolate", "nan")

@@ -12,12 +12,13 @@ from typing import NamedTuple
 import numpy as np
 
 from quadcurv.stencils import Stencils
-from quadcurv.types import Floats, Indices, Ints
+from quadcurv.types import Bools, Floats, Indices, Ints
 
 RINGS = 5
 # Degree and rings of fits; a corner of one triangle has points for all terms only with one ring more.
 _FITS = ((5, 5), (4, 4), (3, 3), (2, 2), (3, 4), (2, 3))
 ROOM = 128  # vertices of a neighbourhood
+_TURN = 5  # triangles, of which quads are two, around a vertex with points on nearly all sides
 _DETERMINED = 0.5  # error of points about the mirror images, in edges, from which on there is no surface
 
 
@@ -98,13 +99,31 @@ def fitted(stencils: Stencils, vertices: Indices) -> Surfaces:
     noise = np.where(np.isfinite(noise), np.sqrt(shared), np.inf)
     with np.errstate(invalid="ignore"):  # an infinite one times nothing is none
         error = np.where(np.isfinite(noise), noise * gain, np.inf)
-    error = np.where(error < _DETERMINED * _distance(stencils, around, ring)[:, None], error, np.inf)
+    most = np.where(_wide(stencils, around, ring), _DETERMINED * _distance(stencils, around, ring), 0.0)
+    error = np.where(error < most[:, None], error, np.inf)
     best = np.arange(k), np.argmin(error, axis=1)
     found = found[best]
     maps = found[:, kernel.MAP : kernel.COEFFICIENTS].reshape(k, 2, 2)
     coefficients = found[:, kernel.COEFFICIENTS : kernel.NOISE]
     chosen = maps, coefficients, error[best], noise[best], found[:, kernel.BEND]
     return Surfaces._make((stencils.points[vertices], frames, *chosen, around, ring))
+
+
+def wide(stencils: Stencils) -> Bools:
+    """(n,): vertices with points on all sides, or all but a quarter of a turn: three rows in any direction.
+
+    Strips of faces one wide have none, and tell nothing of the curvature across them.
+    """
+    corners = np.where(stencils.faces[:, 3:] < 0, 1, 2) * (stencils.faces >= 0)
+    turn = np.bincount(np.abs(stencils.faces).ravel(), corners.ravel(), len(stencils.points))
+    return np.asarray(stencils.closed | (turn[: stencils.n] >= _TURN))
+
+
+def _wide(stencils: Stencils, around: Ints, ring: Ints) -> Bools:
+    """Whether there are such vertices within two rings; cells have corners on either side."""
+    if len(stencils.points) > stencils.n:
+        return np.ones(len(around), bool)
+    return np.asarray((wide(stencils)[around] & (around >= 0) & (ring <= 2)).any(axis=1))
 
 
 def _distance(stencils: Stencils, around: Ints, ring: Ints) -> Floats:

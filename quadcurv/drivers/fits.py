@@ -24,6 +24,7 @@ from quadcurv.boundary import (
     mirrored,
     poles,
     welded,
+    wide,
 )
 from quadcurv.drivers.features import Features, features
 from quadcurv.drivers.rings import FaceRings, GridWindows, bundles
@@ -68,7 +69,10 @@ class MeshNeighbourhoods:
     def __init__(self, mesh: Mesh, boundary: str) -> None:
         self.mesh, self.boundary = mesh, boundary
         self.stencils, self.present = _stencils(mesh)
-        self.wanted = self.present & self.stencils.closed if boundary == "nan" else self.present
+        if boundary == "nan":
+            self.wanted = self.present & self.stencils.closed
+        else:
+            self.wanted = self.present & _seen_across(mesh, self.stencils)
         self._border: dict[int, Floats] = {}
         x = self.stencils.points[: self.stencils.n][self.present]
         self.rounding = ROUNDING * float(np.abs(x).max(initial=0.0))
@@ -283,6 +287,20 @@ def _continued(stencils: Stencils, layers: int) -> list[_Beyond]:
     place = np.full(stencils.n, -1)
     place[kept[chosen]] = chosen
     return [_Beyond(FaceRings(ghosted), place, layers)]
+
+
+def _seen_across(mesh: Mesh, stencils: Stencils) -> Bools:
+    """(n,): not vertices far within strips of faces one wide, whose points tell nothing across them."""
+    seen = np.ones(stencils.n, bool)
+    if isinstance(mesh, StaggeredGrid) or stencils.closed.all():
+        return seen
+    corners = np.where(stencils.faces < 0, stencils.faces[:, :1], stencils.faces)
+    if stencils.closed[corners].any(axis=1).all():
+        return seen
+    seen = wide(stencils)
+    for _ in range(2):
+        seen = _with_neighbours(stencils, seen)
+    return seen
 
 
 def _with_neighbours(stencils: Stencils, chosen: Bools) -> Bools:

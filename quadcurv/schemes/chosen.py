@@ -27,6 +27,7 @@ _LAST = (1, 2, 3, 4)  # rings of quadratic fits
 _CONDITION = {6: 500.0, 4: 160.0, 2: 40.0}
 # The same of one-sided fits; over fewer rows than one more than the degree what they leave out is not seen.
 _ONE_SIDED = {(6, 3): 2e3, (6, 4): 2e3, (6, 5): 1e4, (4, 2): 1e3, (4, 3): 1e3, (4, 4): 1e3}
+_FREE = 2  # points more than terms, with which a one-sided fit still passes through all by chance
 # What noise leaves of its square in weighted residuals, and their degrees of freedom, both per point more
 # than terms: measured on quads and triangles, jittered or not, at valences 3 to 5.
 _LEFT = {6: (0.41, 0.67), 4: (0.31, 0.62), 2: (0.06, 0.57)}
@@ -240,7 +241,7 @@ def _at_sides(around: Neighbourhoods, vertices: Indices, first: Floats, found: _
     fits, beyond, errors, noisy = [], [], [], np.zeros(vertices.size, bool)
     for d, r, ghosts in _SIDES:
         here = first if (d, r) == (6, 3) else around.polynomials(vertices, d, r, ghosts, kernel.SMOOTH)
-        good = here[:, kernel.CONDITION] <= _ONE_SIDED[d, r]
+        good = (here[:, kernel.CONDITION] <= _ONE_SIDED[d, r]) & (here[:, kernel.FREEDOM] > _FREE)
         if ghosts:  # points beyond a border are never too steep: look at those that are there
             there = around.polynomials(vertices, 2, r, False, kernel.SMOOTH)
             good &= ~np.isnan(there[:, kernel.CONDITION])
