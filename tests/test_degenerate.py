@@ -318,3 +318,39 @@ def test_angle_defect_beside_an_edge_without_length():
     K = qc.gaussian_curvature(mesh, "angle_defect")
     assert np.isfinite(K[mesh.stencils().closed]).all()
     assert np.nanmax(np.abs(K)) < 1e-11
+
+
+# ---- strips ---------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("scheme", SCHEMES)
+@pytest.mark.parametrize("kind", ["quads", "triangles", "bent"])
+def test_strips_of_faces_one_wide_tell_nothing_across(scheme, kind):
+    """Two rows of a coarse mesh bend, and so determined a quadric: H was up to 2.7 of curvatures of 1."""
+    points, wrap = surfaces.catenoid().sample((20, 20))[0].points, (False, True)
+    if kind == "bent":  # a row, a column, and a wide part eight faces away
+        hidden = np.ones((21, 20), bool)
+        hidden[:2, :10] = hidden[:14, 8:10] = hidden[14:, 4:14] = False
+        H = qc.mean_curvature(qc.QuadGrid(points, wrap, mask=hidden), scheme)
+        assert np.isfinite(H[17:20, 5:13]).all()
+        assert np.isnan(H[:2, :5]).all()
+        assert np.isnan(H[4:11, 8:10]).all()
+        return
+    mesh = qc.QuadGrid(points[3:5], wrap).to_mesh()
+    faces = mesh.faces
+    if kind == "triangles":
+        faces = np.concatenate((faces[:, [0, 1, 2]], faces[:, [0, 2, 3]]))
+    assert np.isnan(qc.mean_curvature((mesh.points, faces), scheme)).all()
+    assert np.isfinite(qc.mean_curvature(qc.QuadGrid(points[3:6], wrap), scheme)).all()
+
+
+def test_fits_through_all_points_know_nothing_of_their_errors(rng):
+    """A quartic through 14 neighbours leaves no residuals: in meshes full of holes H was up to 60, +-0.3."""
+    surface = surfaces.catenoid()
+    grid, u, v = surface.sample((20, 20))
+    for _ in range(6):
+        hidden = rng.random(grid.shape) < rng.uniform(0.2, 0.4)
+        found = qc.curvatures(qc.QuadGrid(grid.points, grid.wrap, mask=hidden))
+        error = np.abs(found.mean - surface.mean_curvature(u, v))
+        known = np.isfinite(error)
+        assert (error[known] < np.maximum(2.0, 2 * found.interval.mean[known])).all()

@@ -114,8 +114,8 @@ def _stars(part: Stencils, layer: Ghosts) -> list[tuple[Indices, Stars]]:
         error = surfaces.error[begin : begin + fan.vertex.size]
         kept = np.flatnonzero(error < layer.error[fan.vertex])
         if kept.size:
-            own, at = fan.of(kept), surfaces.of(begin + kept)
-            found += [(own.vertex[rows], star) for rows, star in stars(part, own, at)]
+            own = fan.of(kept)
+            found.append((own.vertex, stars(part, own, surfaces.of(begin + kept))))
         begin += fan.vertex.size
     return found
 

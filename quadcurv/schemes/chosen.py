@@ -273,7 +273,8 @@ def _at_sides(around: Neighbourhoods, vertices: Indices, first: Floats, found: _
     for r in _LAST:
         here = around.polynomials(vertices[todo], 2, r, r == 1, kernel.SMOOTH)
         good = here[:, kernel.CONDITION] <= _CONDITION[2]
-        found.put(vertices[todo[good]], here[good], 2, r)
+        off = np.nan_to_num(around.border_error(r)[vertices[todo[good]]]) if r == 1 else 0.0
+        found.put(vertices[todo[good]], here[good], 2, r, off)
         todo = todo[~good]
     if todo.size:
         _spheres(around, vertices[todo], found)
