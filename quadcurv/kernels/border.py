@@ -4,7 +4,7 @@ from math import inf, nan
 
 import numpy as np
 
-from quadcurv.kernels.compiled import flat, helper, kernel
+from quadcurv.kernels.compiled import flat, kernel
 from quadcurv.kernels.formulas import Carried, bits, formula, from_bits, span, where
 from quadcurv.kernels.vector import apart, cross, dot, larger, less, place, plus, smaller, times, triple
 
@@ -63,55 +63,45 @@ def continue_corner(ghosts, first, along, to):
     place(ghosts, to, 1, plus(x, [continued(numbers)[0] for numbers in zip(*line, strict=True)]))
 
 
-@helper
+@formula
 def side(r, c, axis, end):
     """Of a side of a grid, in numbers of its points: the first, the way to the next line and along a line.
 
     Then how many lines there are.
     """
-    along, inward, depth, count = (3, 3 * c, r, c) if axis == 0 else (3 * c, 3, c, r)
-    return (inward * (depth - 1), along, -inward, count) if end == 1 else (0, along, inward, count)
+    is_column = axis > 0
+    along, inward = where(is_column, 3 * c, 3), where(is_column, 3, 3 * c)
+    depth, count = where(is_column, c, r), where(is_column, r, c)
+    return where(end > 0, inward * (depth - 1), 0), along, where(end > 0, -1 * inward, inward), count
+
+
+@formula
+def fill(values, begin, end, x):
+    """Make some numbers x."""
+    for k in span(begin, end):
+        values[k] = x
 
 
 @kernel
 def _continue(points, r, c, closed, wraps, smooth, earlier, hidden, rounding, ghosts, excess):
     # Of axis 0 whether it is `closed`, of axis 1 whether it `wraps`.
-    for k in range(ghosts.size):
-        ghosts[k] = nan
-    for axis in range(2):
-        other, depth = (wraps, r) if axis == 0 else (closed, c)
-        for end in range(2):
-            first, along, inward, count = side(r, c, axis, end)
-            to, line = (
-                (3 * c * end, c * end) if axis == 0 else (6 * c + 3 * (r + 2) * end + 3, 2 * c + r * end)
-            )
-            open_ = (closed if axis == 0 else wraps) == 0
-            if open_ and depth >= 6:
-                continue_lines(
-                    points,
-                    first,
-                    along,
-                    inward,
-                    count,
-                    other,
-                    smooth,
-                    earlier,
-                    hidden,
-                    rounding,
-                    ghosts,
-                    to,
-                    excess,
-                    line,
-                )
-            else:
-                for k in range(count):
-                    excess[line + k] = inf if open_ else -inf
-    if wraps == 0 and closed == 0 and c > 4:  # lines of ghosts before the first and after the last row
-        for end in range(2):
-            first, _, inward, _ = side(r, c, 1, end)
-            to = 6 * c + 3 * (r + 2) * end
-            continue_corner(ghosts, first, inward, to)
-            continue_corner(ghosts, 3 * c + first, inward, to + 3 * (r + 1))
+    fill(ghosts, 0, ghosts.size, nan)
+    for k in range(4):
+        axis, end = k >> 1, k & 1
+        other, depth, is_closed = (closed, c, wraps) if axis == 1 else (wraps, r, closed)
+        first, along, inward, count = side(r, c, axis, end)
+        to, line = (3 * c * end, c * end) if axis == 0 else (6 * c + 3 * (r + 2) * end + 3, 2 * c + r * end)
+        fill(excess, line, line + count, -inf if is_closed else inf)
+        if depth >= 6 and not is_closed:
+            continue_lines(
+                points, first, along, inward, count, other, smooth, earlier, hidden, rounding, ghosts, to,
+                excess, line,
+            )  # fmt: skip
+    for k in range(4 if c > 4 and not wraps and not closed else 0):
+        # Lines of ghosts before the first and after the last row.
+        first, _, inward, _ = side(r, c, 1, k >> 1)
+        row, to = k & 1, 6 * c + 3 * (r + 2) * (k >> 1)
+        continue_corner(ghosts, 3 * c * row + first, inward, to + 3 * (r + 1) * row)
 
 
 def continue_sides(points, wrap, limits):
@@ -167,10 +157,10 @@ def crowded(points, first, along, inward, count, wraps, tolerance):
 @kernel
 def _crowded(points, r, c, closed, wraps, tolerance):
     number = 0
-    for axis in range(2):
-        of_axis, other = (closed, wraps) if axis == 0 else (wraps, closed)
-        for end in range(2 if of_axis == 0 else 0):
-            first, along, inward, count = side(r, c, axis, end)
+    for k in range(4):
+        is_closed, other = (wraps, closed) if k > 1 else (closed, wraps)
+        if not is_closed:
+            first, along, inward, count = side(r, c, k >> 1, k & 1)
             number += crowded(points, first, along, inward, count, other, tolerance)
     return number
 

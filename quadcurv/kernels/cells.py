@@ -3,10 +3,8 @@
 As that of `rows`; a and b are the rows of dual points before and after row p.
 """
 
-import numpy as np
-
 from quadcurv.kernels.compiled import kernel
-from quadcurv.kernels.formulas import Carried, bits, formula, span, where
+from quadcurv.kernels.formulas import Carried, bits, formula, part_of, span, where
 from quadcurv.kernels.quad import fluxes, quads_scale, ring_scale
 from quadcurv.kernels.rows import (
     AREA,
@@ -14,26 +12,27 @@ from quadcurv.kernels.rows import (
     LENGTH,
     MOST,
     NORMAL,
+    PLANES,
     QUAD_SQUARE,
     RING,
     RING_SCALE,
-    ROOM,
     ROW,
     SCALE,
     SQUARE,
     STRETCH,
     TOGETHER,
     WIDTH,
+    WORK,
     S,
     Y,
-    clear_rooms,
+    clear,
     dual_areas,
     is_clear,
     last_quad,
     load_ends,
     load_row,
+    make_room,
     ring_normal,
-    rooms,
     unit_normals,
     vector_curvatures,
 )
@@ -205,16 +204,19 @@ def cell_curvatures(planes, p, q, a, b, work, part, scale, H, g, at, width):
 
 @kernel
 def _pass(points, size, c, beyond, beside, dual, liu, Hn, H, normal, area, start, stop, room):
-    planes, part, work = rooms(room)
+    planes, part = part_of(room, 0, 4 * ROW), part_of(room, 4 * ROW, 4 * Y)
+    work = part_of(room, PLANES * Y, WORK)
     rows, around = points.size // size, beyond.size == 0
     vectors, numbers, normals, areas = Hn.size > 0, H.size > 0, normal.size > 0, area.size > 0
     scale = RING_SCALE if liu else SCALE
     for begin in range(0, c, WIDTH):
         end = min(begin + WIDTH, c)
         p, q, a, b, far = 0, ROW, 2 * ROW, 3 * ROW, 0
-        clear_rooms(planes, part, work, end - begin)
+        clear(planes, part, work, end - begin)
         for i in range(start - 1, stop + 1):  # p and a are rows i - 1 once they are there
-            ahead = i % rows if around else i
+            ahead = i
+            if around and not 0 <= i < rows:
+                ahead += rows if i < 0 else -rows
             inside = 0 <= ahead < rows
             first = size * ahead if inside else 0 if ahead < 0 else 3 * c
             to, width, row = q + FIRST, end - begin, ahead + 1
@@ -262,4 +264,4 @@ def staggered_curvatures(points, size, c, beyond, beside, dual, liu, Hn, H, norm
     liu, Hn, H, normal, area, start, stop
         As for `grid_curvatures`.
     """
-    _pass(points, size, c, beyond, beside, dual, liu, Hn, H, normal, area, start, stop, np.empty(ROOM))
+    _pass(points, size, c, beyond, beside, dual, liu, Hn, H, normal, area, start, stop, make_room())

@@ -36,29 +36,59 @@ def largest(values):
     return found[0] if len(found) == 1 else float(np.max(found))
 
 
-@formula
-def measured(points, first, second, square):
+def measured(points, ends, square):
     """Squares of the lengths of steps; the largest coordinate of their ends, the largest extent of these."""
     low, high = Carried((inf,) * 3), Carried((-inf,) * 3)
-    for k in span(0, first.size):
-        a, b = triple(points, 3 * first[k], 1), triple(points, 3 * second[k], 1)
+    for k in span(0, square.size):
+        a, b = (triple(points, 3 * end, 1) for end in ends(k))
         step = less(b, a)
         square[k] = dot(step, step)
-        low.set(
-            [smaller(x, smaller(*ends)) for x, ends in zip(low.get(), zip(a, b, strict=True), strict=True)]
-        )
-        high.set(
-            [larger(x, larger(*ends)) for x, ends in zip(high.get(), zip(a, b, strict=True), strict=True)]
-        )
+        lower, higher = ([some(x, y) for x, y in zip(a, b, strict=True)] for some in (smaller, larger))
+        low.set([smaller(x, y) for x, y in zip(low.get(), lower, strict=True)])
+        high.set([larger(x, y) for x, y in zip(high.get(), higher, strict=True)])
     far, extent = 0.0, 0.0
     for x, y in zip(low.get(), high.get(), strict=True):
         far, extent = larger(far, larger(-x, y)), larger(extent, y - x)
     return far, extent
 
 
+@formula
+def measured_steps(points, first, second, square):
+    """As `measured`."""
+    return measured(points, lambda k: (first[k], second[k]), square)
+
+
+@formula
+def measured_grid(points, r, c, every, square):
+    """As `measured`, from points of a grid to those in the next row, then to those in the next column."""
+    number = square.size >> 1
+
+    def ends(k):
+        along = k >= number
+        at = every * where(along, k - number, k)
+        last = where(along, at % c == c - 1, at >= (r - 1) * c)
+        # Of a single row or column these steps end where they begin.
+        step = where(along, where(c > 1, 1, 0), where(r > 1, c, 0))
+        first = where(last, at - step, at)
+        return first, first + step
+
+    return measured(points, ends, square)
+
+
+@formula
+def measured_faces(points, faces, every, square):
+    """As `measured`, along the first two edges of faces."""
+
+    def ends(k):
+        corner = 4 * every * (k >> 1) + (k & 1)
+        return faces[corner], faces[corner + 1]
+
+    return measured(points, ends, square)
+
+
 @kernel
 def _steps(points, first, second, square):
-    return measured(points, first, second, square)
+    return measured_steps(points, first, second, square)
 
 
 def steps(points, first, second):
@@ -71,36 +101,23 @@ def steps(points, first, second):
 
 
 @kernel
-def _grid_steps(points, r, c, every, first, second, square):
-    number = square.size // 2
-    for k in range(number):
-        i, j = every * k // c, every * k % c
-        # Of a single row or column these steps end where they begin.
-        above, left = max(0, min(i, r - 2)), max(0, min(j, c - 2))
-        first[k], first[number + k] = c * above + j, c * i + left
-        second[k], second[number + k] = c * min(above + 1, r - 1) + j, c * i + min(left + 1, c - 1)
-    return measured(points, first, second, square)
+def _grid_steps(points, r, c, every, square):
+    return measured_grid(points, r, c, every, square)
 
 
 def grid_steps(points, every):
     """As `steps`, from points (r, c, 3) of a grid to those in the next row and column, one of so many."""
     r, c, _ = points.shape
-    number = 2 * -(-r * c // every)
-    square, (first, second) = np.empty(number), np.empty((2, number), np.int64)
-    return square, *_grid_steps(flat(points), r, c, every, first, second, square)
+    square = np.empty(2 * -(-r * c // every))
+    return square, *_grid_steps(flat(points), r, c, every, square)
 
 
 @kernel
-def _face_steps(points, faces, every, first, second, square):
-    for k in range(square.size // 2):
-        corner = 4 * every * k
-        first[2 * k], first[2 * k + 1] = faces[corner], faces[corner + 1]
-        second[2 * k], second[2 * k + 1] = faces[corner + 1], faces[corner + 2]
-    return measured(points, first, second, square)
+def _face_steps(points, faces, every, square):
+    return measured_faces(points, faces, every, square)
 
 
 def face_steps(points, faces, every):
     """As `steps`, along the first two edges of one of so many faces (m, 4)."""
-    number = 2 * -(-len(faces) // every)
-    square, (first, second) = np.empty(number), np.empty((2, number), np.int64)
-    return square, *_face_steps(flat(points), flat(faces), every, first, second, square)
+    square = np.empty(2 * -(-len(faces) // every))
+    return square, *_face_steps(flat(points), flat(faces), every, square)

@@ -19,6 +19,7 @@ from llvmlite import ir
 from numba import types
 from numba.core import cgutils
 from numba.extending import intrinsic
+from numba.np.arrayobj import populate_array
 
 WIDTH = 8  # numbers that stand side by side in `Lanes`
 _DOUBLE, _INT, _BOOL = ir.DoubleType(), ir.IntType(64), ir.IntType(1)
@@ -130,6 +131,7 @@ class Whole(_Value):
     __add__, __sub__, __mul__ = map(_operator, ("add", "sub", "mul"))
     __radd__, __rsub__ = _operator("add", swapped=True), _operator("sub", swapped=True)
     __rmul__, __rshift__, __and__ = _operator("mul", swapped=True), _operator("ashr"), _operator("and_")
+    __mod__ = _operator("srem")  # of what is not negative
     __lt__, __le__, __gt__, __ge__, __eq__, __ne__ = (
         _comparison("icmp_signed", sign) for sign in ("<", "<=", ">", ">=", "==", "!=")
     )
@@ -230,6 +232,20 @@ def formula(function=None, *, contract=False):
     made = intrinsic(definition)
     made.py_func = function
     return made
+
+
+@intrinsic
+def part_of(typing, array, begin, size):
+    """So many numbers of an array from one on, as an array: a slice whose ends nobody looks at."""
+
+    def generate(context, builder, signature, arguments):
+        given, begin, size = arguments
+        whole, part = context.make_array(array)(context, builder, given), context.make_array(array)
+        made, width = part(context, builder), whole.itemsize
+        populate_array(made, builder.gep(whole.data, [begin]), [size], [width], width, None)
+        return made._getvalue()
+
+    return array(array, types.int64, types.int64), generate
 
 
 def _kind(t):
@@ -482,9 +498,12 @@ def less_half(bits, x):
     return Real(builder.bitcast(builder.sub(_INT(bits), half), _DOUBLE))
 
 
-def address(values):
-    """Where the memory of an array begins."""
-    return Whole(_desk.drafts[-1].builder.ptrtoint(values.data, _INT))
+def make_zero(values, index, size):
+    """Write so many zeros from an entry on."""
+    draft = _desk.drafts[-1]
+    first = draft.builder.bitcast(values.address(index), cgutils.voidptr_t)
+    length = Whole.of(size * (values.dtype.bitwidth // 8))
+    _called("llvm.memset.p0.i64", ir.VoidType(), [first, ir.IntType(8)(0), length, _BOOL(0)])
 
 
 def prefetch(values, index, write=False):

@@ -10,8 +10,18 @@ same place of another page waits for it; so placed, loads keep ahead of stores.)
 
 import numpy as np
 
-from quadcurv.kernels.compiled import helper, kernel
-from quadcurv.kernels.formulas import Carried, address, bits, formula, from_bits, prefetch, span, where
+from quadcurv.kernels.compiled import kernel
+from quadcurv.kernels.formulas import (
+    Carried,
+    bits,
+    formula,
+    from_bits,
+    make_zero,
+    part_of,
+    prefetch,
+    span,
+    where,
+)
 from quadcurv.kernels.quad import fluxes, quads_area, quads_scale, ring_area, ring_scale
 from quadcurv.kernels.vector import (
     apart,
@@ -47,43 +57,28 @@ NORMAL, LENGTH, U, V, RING, SQUARE, RING_SCALE, SCALE, AREA, QUAD_SQUARE = (
     k * S for k in (0, 3, 4, 7, 10, 13, 14, 15, 16, 17)
 )
 PLANES = 16  # of the rows and of `part`
-ROOM = PLANES * Y + PAGE + 23 * S  # these, `work`, and the beginning of a page
+WORK = 23 * S
+ROOM = PLANES * Y + WORK + PAGE  # and the beginning of a page
+
+
+def make_room():
+    """Scratch for one call of a pass, which begins where a page of memory does."""
+    found = np.empty(ROOM)
+    return found[-(found.__array_interface__["data"][0] // 8) % PAGE :]
 
 
 @formula
-def page(room):
-    """Place of the first number of an array with which a page begins."""
-    return (0 - (address(room) >> 3)) & (PAGE - 1)
-
-
-@helper
-def rooms(room):
-    """Rows, `part` and `work` in the room of one call."""
-    first = page(room)
-    end = first + 4 * ROW
-    return room[first:end], room[end : end + 4 * Y], room[end + 4 * Y :]
-
-
-@formula
-def clear(values, start, stop):
-    """Make numbers zero."""
-    for k in span(start, stop):
-        values[k] = 0.0
-
-
-@helper
-def clear_rooms(planes, part, work, width):
+def clear(planes, part, work, width):
     """Make zero what stretches read, being computed whole, before it is written.
 
     What lay in the memory before may be numbers so small that a processor takes a hundred times as long for
     each.
     """
-    clear(work, 0, 23 * S)
-    end = FIRST + width + TOGETHER
-    for plane in range(0, planes.size, Y):
-        clear(planes, plane + FIRST + width, plane + end + 1)
-    for plane in range(0, part.size, Y):
-        clear(part, plane + FIRST, plane + end)
+    make_zero(work, 0, WORK)
+    for plane in span(0, 12):
+        make_zero(planes, plane * Y + FIRST + width, TOGETHER + 1)
+    for plane in span(0, 4):
+        make_zero(part, plane * Y + FIRST, width + TOGETHER)
 
 
 @formula
@@ -324,18 +319,19 @@ def ask_to_write(values, begin):
 @kernel
 def _pass(points, size, c, beyond, beside, liu, Hn, H, normal, area, start, stop, room):
     # An array of size 0 is a result that nobody wants.
-    planes, part, work = rooms(room)
-    rows, around, unwanted = points.size // size, beyond.size == 0, work[18 * S :]
+    planes, part = part_of(room, 0, 4 * ROW), part_of(room, 4 * ROW, 4 * Y)
+    work = part_of(room, PLANES * Y, WORK)
+    rows, around, unwanted = points.size // size, beyond.size == 0, part_of(work, 18 * S, 3 * S)
     vectors, numbers, normals, areas = Hn.size > 0, H.size > 0, normal.size > 0, area.size > 0
     scale = RING_SCALE if liu else SCALE
     for begin in range(0, c, WIDTH):
         end = min(begin + WIDTH, c)
         o, p, q, fresh, far = 0, ROW, 2 * ROW, 3 * ROW, 0
-        clear_rooms(planes, part, work, end - begin)
+        clear(planes, part, work, end - begin)
         for i in range(start - 3, stop):
             ahead, wanted = min(i + 2, stop), i >= start  # the row that is loaded; whether there are results
-            if around:
-                ahead %= rows
+            if around and not 0 <= ahead < rows:
+                ahead += rows if ahead < 0 else -rows
             inside = 0 <= ahead < rows
             first = size * ahead if inside else 0 if ahead < 0 else 3 * c
             for left in range(begin, end, STRETCH):
@@ -423,4 +419,4 @@ def grid_curvatures(points, size, c, beyond, beside, liu, Hn, H, normal, area, s
         As these.
     start, stop : int
     """
-    _pass(points, size, c, beyond, beside, liu, Hn, H, normal, area, start, stop, np.empty(ROOM))
+    _pass(points, size, c, beyond, beside, liu, Hn, H, normal, area, start, stop, make_room())
