@@ -141,7 +141,7 @@ class Stencils:
 
         Zero where there is none but for rounding.
         """
-        from quadcurv.kernels import faces, vector
+        from quadcurv.kernels import faces
 
         if self.orientable:
             sums = np.zeros((len(self.points), 4))
@@ -152,10 +152,7 @@ class Stencils:
             u, v = self.points[a] - self.points[c], self.points[b] - self.points[c]
             corner = np.column_stack((np.cross(u, v) / 4, (u**2 + v**2).sum(axis=1)))
             sums = scipy.sparse.csr_array((np.ones(c.size), np.arange(c.size), indptr)) @ corner
-        normal, edges = sums[:, :3].copy(), sums[:, 3]
-        square, far = (np.einsum("ix,ix->i", x, x) for x in (4 * normal, self.points[: self.n]))
-        normal[~(square > np.maximum(vector.rounding(edges, far), np.finfo(float).tiny))] = 0
-        return normal
+        return faces.known_areas(self.points, sums)
 
     @cached_property
     def corner_table(self) -> CornerTable:

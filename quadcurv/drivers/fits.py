@@ -67,15 +67,17 @@ class MeshNeighbourhoods:
     """The `Neighbourhoods` of a mesh."""
 
     def __init__(self, mesh: Mesh, boundary: str) -> None:
+        from quadcurv.kernels.extent import largest
+
         self.mesh, self.boundary = mesh, boundary
         self.stencils, self.present = _stencils(mesh)
         if boundary == "nan":
             self.wanted = self.present & self.stencils.closed
         else:
             self.wanted = self.present & _seen_across(mesh, self.stencils)
-        self._border: dict[int, Floats] = {}
-        x = self.stencils.points[: self.stencils.n][self.present]
-        self.rounding = ROUNDING * float(np.abs(x).max(initial=0.0))
+        self.completed: dict[int, Floats] = {}
+        x = self.stencils.points[: self.stencils.n]
+        self.rounding = ROUNDING * largest(x if self.present.all() else x[self.present])
 
     def polynomials(
         self, vertices: Indices, degree: int, rings: int, ghosts: bool = True, kind: int = 0, nested: int = 1
@@ -111,7 +113,9 @@ class MeshNeighbourhoods:
 
         Points read off these show none. NaN where neighbourhoods of so many rings have no such points.
         """
-        return self._border.setdefault(rings, np.full((2, self.stencils.n), np.nan))
+        if rings not in self.completed:
+            self.completed[rings] = np.full((2, self.stencils.n), np.nan)
+        return self.completed[rings]
 
     def positions(self, vertices: Indices, rings: int, ghosts: bool = True) -> tuple[Floats, Floats]:
         """(k, m, 3) and (k, 3): see `Neighbourhoods`."""
@@ -219,6 +223,8 @@ class MeshNeighbourhoods:
 
     def _mirrored(self, vertices: Indices, rings: int, inside: bool = False) -> list[_Beyond]:
         """Neighbourhoods completed by points of fitted surfaces, as stencils that lead to these points."""
+        if not vertices.size:
+            return []
         key = vertices.tobytes()
         if key not in self._surfaces:  # the same for every number of rings
             self._surfaces[key] = fitted(self.stencils, vertices)
@@ -357,11 +363,12 @@ def each(found: Curvatures, change: Callable[[Any], Any]) -> Curvatures:
 def _with_border_errors(found: Curvatures, around: MeshNeighbourhoods) -> Curvatures:
     """Curvatures with the errors of the surfaces that their neighbourhoods were completed from."""
     assert found.standard_error is not None
+    if not around.completed:
+        return found
     own = found.standard_error.mean
     error, noise = np.full((2, own.size), np.nan)
-    for r in range(1, _GHOST_LAYERS + 1):
+    for r, here in around.completed.items():
         at = np.full(own.size, True) if found.rings is None else found.rings == r
-        here = around.at_border(r)
         error[at], noise[at] = np.fmax(error, here[0])[at], np.fmax(noise, here[1])[at]
     larger = error > own
     if not larger.any():

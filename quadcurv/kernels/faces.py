@@ -3,8 +3,21 @@
 import numpy as np
 
 from quadcurv.kernels.compiled import flat, kernel
-from quadcurv.kernels.formulas import formula, root
-from quadcurv.kernels.vector import apart, cross, dot, known_square, middle, plus, times, triple, unless_zero
+from quadcurv.kernels.formulas import formula, root, where
+from quadcurv.kernels.vector import (
+    LEAST,
+    apart,
+    cross,
+    dot,
+    known_square,
+    middle,
+    place,
+    plus,
+    rounding,
+    times,
+    triple,
+    unless_zero,
+)
 
 
 def add(sums, v, a):
@@ -141,3 +154,25 @@ def ring_normals(points, faces, sums):
     The fourth of the `sums` (p, 4) is that of the squares of all these factors.
     """
     _ring_normals(flat(points), flat(faces, np.int32), sums.ravel())
+
+
+@formula
+def put_area(points, sums, v, areas):
+    """Write a vector area, zero where there is none but for rounding."""
+    n, point = [sums[4 * v + x] for x in range(3)], triple(points, 3 * v, 1)
+    square = 16.0 * dot(n, n)
+    known = (square > rounding(sums[4 * v + 3], dot(point, point))) & (square > LEAST)
+    place(areas, 3 * v, 1, [where(known, x, 0.0) for x in n])
+
+
+@kernel
+def _known_areas(points, sums, areas):
+    for v in range(areas.size // 3):
+        put_area(points, sums, v, areas)
+
+
+def known_areas(points, sums):
+    """Half the vector areas (n, 3) of ring polygons from their `ring_normals` (n, 4)."""
+    areas = np.empty((len(sums), 3))
+    _known_areas(flat(points), flat(sums), areas.reshape(-1))
+    return areas

@@ -119,8 +119,21 @@ def corners_of(faces, f, mark, stamp, around, end):
     return end
 
 
+@formula
+def new_ones(others, first, last, mark, stamp, around, end):
+    """Write those of some vertices that are new behind what is there; where that ends then."""
+    at = Carried((end,))
+    for k in span(first, last):
+        v, (end,) = others[k], at.get()
+        is_new = stamp[v] != mark
+        around[end] = v
+        stamp[v] = mark
+        at.set((end + where(is_new, 1, 0),))
+    return at.get()[0]
+
+
 @helper
-def neighbourhood(faces, indptr, corners, c, rings, mark, stamp, around):
+def neighbourhood(faces, indptr, corners, c, rings, mark, stamp, around, seen, others, first, last):
     """Write c and the vertices of `rings` rings of faces around it to `around`; how many they are."""
     stamp[c] = mark
     around[0] = c
@@ -129,10 +142,15 @@ def neighbourhood(faces, indptr, corners, c, rings, mark, stamp, around):
         new = end
         for q in range(begin, end):
             v = around[q]
-            # Of a vertex of very many faces, a pole, some stand for all: else its neighbours' fits would each
-            # look at all of them.
-            for k in range(indptr[v], indptr[v + 1], max(1, (indptr[v + 1] - indptr[v]) // CROWDED)):
-                new = corners_of(faces, corners[k] >> 2, mark, stamp, around, new)
+            if last[v] == 0:  # nobody has looked around it: behind all is the end of what is known of others
+                first[v] = at = last[last.size - 1]
+                seen[v] = v + 1
+                # Of a vertex of very many faces, a pole, some stand for all: else its neighbours' fits would
+                # each look at all of them.
+                for k in range(indptr[v], indptr[v + 1], max(1, (indptr[v + 1] - indptr[v]) // CROWDED)):
+                    at = corners_of(faces, corners[k] >> 2, v + 1, seen, others, at)
+                last[v] = last[last.size - 1] = at
+            new = new_ones(others, first[v], last[v], mark, stamp, around, new)
         begin, end = end, new
     return end
 
@@ -228,8 +246,9 @@ def put(around, size, room, c, at, index):
 
 @kernel
 def _neighbourhoods(
-    faces, indptr, corners, ring, run, rings, centres, blocks, room, index, counts, beside, stamp, around
-):
+    faces, indptr, corners, ring, run, rings, centres, blocks, room, index, counts, beside, stamp, around,
+    seen, others, first, last,
+):  # fmt: skip
     mark, phase = stamp[stamp.size - 2], (1 - rings) % 3  # the last neighbourhood's
     for k in range(WIDTH * blocks):
         block, lane, c = k >> 3, k & 7, centres[k]
@@ -239,7 +258,9 @@ def _neighbourhoods(
             if ring.size > 0 and ring[8 * c] >= 0:
                 is_window = window(ring, c, rings, phase, mark, stamp, around)
             if not is_window:
-                m = neighbourhood(faces, indptr, corners, c, rings, mark + 1, stamp, around)
+                m = neighbourhood(
+                    faces, indptr, corners, c, rings, mark + 1, stamp, around, seen, others, first, last
+                )
                 if m > room:
                     stamp[stamp.size - 2] = mark
                     return m
@@ -251,12 +272,20 @@ def _neighbourhoods(
     return room
 
 
+@kernel
+def _runs(ring, run):
+    for v in range(run.size - 2, -1, -1):
+        same = ring[8 * v] >= 0
+        for k in range(8 * v, 8 * v + 8):
+            same &= ring[k + 8] - ring[k] == 1
+        run[v] = run[v + 1] + 1 if same else 0
+
+
 def runs(ring):
     """(n,) int32: how many vertices after each have its ring, with every vertex replaced by its next."""
-    ring = ring.reshape(-1, 8)
-    same = (ring[1:] - ring[:-1] == 1).all(axis=1) & (ring[:-1, 0] >= 0)
-    ends = np.append(np.flatnonzero(~same), len(ring) - 1)[: len(ring)]
-    return (np.repeat(ends, np.diff(ends, prepend=-1)) - np.arange(len(ring))).astype(np.int32)
+    run = np.zeros(len(ring), np.int32)
+    _runs(flat(ring), run)
+    return run
 
 
 class Rings:
@@ -279,10 +308,15 @@ class Rings:
         # Which neighbourhood a vertex was last in; behind the vertices, the number of the last one.
         self._stamp = np.zeros(indptr.size + 1, np.int32)
         self._around = np.empty(max(indptr.size + 4, (2 * rings + 1) ** 2), np.int32)
+        # Around which vertex others were last found, and these; where those of each begin and end (0 where
+        # nobody has looked yet), and behind all, where those that are known do.
+        self._seen, self._others = np.zeros(indptr.size, np.int32), np.empty(3 * corners.size + 5, np.int32)
+        self._first, self._last = np.empty(indptr.size, np.int64), np.zeros(indptr.size, np.int64)
+        self._last[-1] = 1
 
     def put(self, blocks):
         """Put those of the centres into blocks; how much room one needs for which there is none."""
         return _neighbourhoods(
             *self._given, blocks.centres, blocks.size, blocks.room, blocks.index, blocks.counts,
-            blocks.beside, self._stamp, self._around,
+            blocks.beside, self._stamp, self._around, self._seen, self._others, self._first, self._last,
         )  # fmt: skip

@@ -119,7 +119,8 @@ def _fits(wanted: Bools, run: Run, degree: int, rings: int) -> tuple[Floats, Int
             most[at[np.isnan(fits[:, kernel.CONDITION])]] = r - 1
             if at.size == wanted.size:
                 out = fits
-                out[~good] = np.nan
+                if not good.all():
+                    out[~good] = np.nan
             else:
                 out = out if len(out) else np.full((kernel.COLUMNS, wanted.size), np.nan).T
                 out[at[good]] = fits[good]
