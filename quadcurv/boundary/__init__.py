@@ -31,7 +31,7 @@ from quadcurv.boundary.poles import closed_grid, parts_at_poles, poles, welded
 from quadcurv.boundary.sides import frame, ghost_layer, part_around
 from quadcurv.boundary.strips import ghosts
 from quadcurv.boundary.strips import roughness as rough_lines
-from quadcurv.boundary.surface import Surfaces, fitted, wide
+from quadcurv.boundary.surface import Surfaces, fitted, tangent_frames, wide
 from quadcurv.mesh import Mesh, QuadGrid, StaggeredGrid
 from quadcurv.stencils import Stencils
 from quadcurv.types import Floats
@@ -61,6 +61,7 @@ __all__ = [
     "parts_at_poles",
     "poles",
     "roughness",
+    "tangent_frames",
     "welded",
     "wide",
 ]

@@ -84,7 +84,7 @@ def fitted(stencils: Stencils, vertices: Indices) -> Surfaces:
     around, ring = nearby.rings_around(stencils.faces, indptr, corners, vertices, RINGS, ROOM)
     size = int((around >= 0).sum(axis=1).max(initial=1))
     around, ring = around[:, :size], ring[:, :size]
-    frames = _frames(_normals(stencils, vertices, around, ring))
+    frames = tangent_frames(_normals(stencils, vertices, around, ring))
     k, areas = vertices.size, stencils.ring_areas
     found = kernel.fits(
         stencils.points, areas, stencils.orientable, around, ring, frames, *zip(*_FITS, strict=True)
@@ -146,8 +146,8 @@ def _normals(stencils: Stencils, vertices: Indices, around: Ints, ring: Ints) ->
         return normal / np.linalg.norm(normal, axis=1, keepdims=True)
 
 
-def _frames(normal: Floats) -> Floats:
-    """Two tangents and the normal (k, 3, 3), without a branch (Duff et al. 2017)."""
+def tangent_frames(normal: Floats) -> Floats:
+    """Two tangents and the unit normal (k, 3, 3), without a branch (Duff et al. 2017)."""
     x, y, z = normal.T
     sign = np.where(z >= 0, 1.0, -1.0)
     a = -1 / (sign + z)

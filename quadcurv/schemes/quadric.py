@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from quadcurv.boundary import tangent_frames
 from quadcurv.schemes.base import Neighbourhoods
 from quadcurv.types import Floats, Indices
 
@@ -33,7 +34,7 @@ def quadrics(around: Neighbourhoods, vertices: Indices, rings: int) -> Floats:
     if fitted.size == 0:
         return out
     apart, count, size = apart[fitted], count[fitted], size[fitted]
-    frames = _frames(normals[fitted])
+    frames = tangent_frames(normals[fitted] / length[fitted, None])
     x, y, z = np.einsum("kmi,kji->jkm", apart / size[:, None, None], frames)
     terms = np.stack((x, y, x * x, x * y, y * y, x * z, y * z, z * z), axis=-1)
     inverse = np.linalg.pinv(terms, rcond=_RANK)
@@ -47,7 +48,7 @@ def quadrics(around: Neighbourhoods, vertices: Indices, rings: int) -> Floats:
     gradient = np.stack((-a, -b, np.ones_like(a)), axis=1)
     hessian = -np.stack((2 * c, d, f, d, 2 * e, g, f, g, 2 * h), axis=1).reshape(-1, 3, 3)
     slope = np.linalg.norm(gradient, axis=1)
-    basis = _frames(gradient)
+    basis = tangent_frames(gradient / slope[:, None])
     shape = np.einsum("kij,kjl,kml->kim", basis[:, :2], hessian, basis[:, :2]) / slope[:, None, None]
     curvature, direction = np.linalg.eigh(shape)
     k2, k1 = curvature.T
@@ -76,12 +77,3 @@ def quadrics(around: Neighbourhoods, vertices: Indices, rings: int) -> Floats:
     out[fitted, kernel.SQUARE], out[fitted, kernel.LOWER] = square * size**2, (lower**2).sum(axis=1) * size**2
     out[fitted, kernel.SIGMA], out[fitted, kernel.FREEDOM] = np.sqrt(square / freedom) * size, freedom
     return out
-
-
-def _frames(normals: Floats) -> Floats:
-    """(k, 3, 3): orthonormal rows, the last along normals of any length."""
-    n = normals / np.linalg.norm(normals, axis=1, keepdims=True)
-    one = np.eye(3)[np.argmin(np.abs(n), axis=1)]
-    one -= np.einsum("kx,kx->k", one, n)[:, None] * n
-    one /= np.linalg.norm(one, axis=1, keepdims=True)
-    return np.stack((one, np.cross(n, one), n), axis=1)
