@@ -209,6 +209,38 @@ def test_intervals_cover(name, n, noise):
     assert 0.92 < np.mean(np.abs(found.mean - exact[0]) <= found.interval.mean) < 0.997
 
 
+HUMPS = cases.Quartic(np.diag((1.2, 0.9, 1.0)), np.array((-0.35, -0.25, -0.3)))
+
+
+@pytest.mark.parametrize("noise", [0.05, 0.1])
+def test_intervals_cover_on_humps(noise):
+    """Where terms that are not looked at are alike round the vertex, and bias is largest; all quantities."""
+    smooth = cases.on(HUMPS, cases.cubed(18, (1, 1, 1)))
+    found = qc.curvatures(smooth.noisy(noise, 101).mesh)
+    exact = smooth.H, smooth.K, smooth.k1, smooth.k2
+    values = found.mean, found.gaussian, found.k1, found.k2
+    for value, true, half in zip(values, exact, found.interval, strict=True):
+        assert np.mean(np.abs(value - true) <= half) > 0.9
+
+
+@pytest.mark.parametrize(
+    ("case", "most"),
+    [
+        (cases.on(cases.ellipsoid(), cases.cubed(16)), 3.5),
+        (cases.ellipsoid().jittered(cases.cubed(16), 0.2), 3.0),
+        (cases.cyclide(48, 48), 2.5),
+        (cases.ring().jittered(cases.ring_grid(60, 36).mesh, 0.15, 7), 4.5),
+    ],
+    ids=["ellipsoid", "jitter", "cyclide", "torus"],
+)
+def test_intervals_are_no_wider_than_errors_ask_for(case, most):
+    """Without noise: what a fit of degree 6 leaves is then the surface's, and seen at the vertex."""
+    found = qc.curvatures(case.mesh)
+    error = np.abs(found.mean - case.H)
+    assert np.mean(error <= found.interval.mean) > 0.95
+    assert found.interval.mean.mean() / 2 < most * error.mean()
+
+
 @pytest.mark.parametrize(
     ("name", "layout", "n", "jitter"),
     [("torus", "grid", 64, 0), ("cubed_ellipsoid", "faces", 24, 0), ("cubed_ellipsoid", "faces", 24, 0.2)],
@@ -253,3 +285,32 @@ def test_kinks_of_lines_are_no_features(valence):
         errors.append(np.abs(found.mean - case.H)[near].max())
     assert errors[-1] < 2e-8
     assert fitted_rate((16, 32, 64), errors) > 4.5
+
+
+@pytest.mark.parametrize("seed", [0, 5])
+def test_open_sheets_in_strong_noise(seed):
+    """What completes neighbourhoods at borders is smooth, and no evidence: there K was off by up to 3,000."""
+    smooth = cases.patch(40)
+    found = qc.curvatures(smooth.noisy(0.3, seed).mesh)
+    assert np.abs(found.gaussian - smooth.K).mean() < 0.4
+    assert np.abs(found.mean - smooth.H).mean() < 0.2
+
+
+@pytest.mark.parametrize(
+    ("name", "noise", "bound"),
+    [
+        ("catenoid", 1e-2, 0.32),
+        ("hyperboloid", 1e-3, 0.08),
+        ("hyperboloid", 1e-2, 0.2),
+        ("enneper", 1e-2, 0.045),
+    ],
+)
+def test_noise_at_borders(name, noise, bound):
+    """Root mean squares of the border rows, where fits are one-sided and choose between noise and bias."""
+    squares = []
+    for seed in (3, 4, 5):
+        mesh, (H, *_) = noisy(name, 40, noise, seed)
+        square = (qc.mean_curvature(mesh) - H) ** 2
+        rows = [np.moveaxis(square, axis, 0)[[0, -1]] for axis in (0, 1) if not mesh.wrap[axis]]
+        squares.append(np.mean(rows))
+    assert np.sqrt(np.mean(squares)) < bound

@@ -155,6 +155,11 @@ class MeshNeighbourhoods:
     def _faces(self) -> FaceRings:
         return FaceRings(self.stencils, present=self.present)
 
+    @property
+    def on_border(self) -> Bools:
+        """(n,): see `Neighbourhoods`."""
+        return self.present & ~self.stencils.closed
+
     @cached_property
     def on_crease(self) -> Bools:
         """(n,): see `Neighbourhoods`."""

@@ -18,7 +18,8 @@ from quadcurv.types import Bools, Floats, Indices
 
 # Rings, and those that follow where degree 6 is best and where a lower one is.
 _FOLLOWING = {3: (4, 5), 4: (5, 5), 5: (6, 8), 6: (8, 8), 8: (0, 0)}
-_NOISE, _POOL = 3, 1  # rings of neighbours whose residuals tell of noise, and whose terms of bias
+# Times that noise is averaged over neighbours, and that what terms explain is.
+_NOISE, _POOL = 12, 1
 POOLED = _NOISE + _POOL * len(_FOLLOWING)
 _WORSE = 2.0  # times the least risk so far, from which on no more rings are taken
 # Most that errors in height, of unit mean square, may grow to in the second derivatives, both in units of
@@ -27,13 +28,17 @@ _WORSE = 2.0  # times the least risk so far, from which on no more rings are tak
 _CONDITION = {6: 160.0, 4: 160.0, 2: 40.0}
 _TERMS = {8: 17, 6: 13, 4: 9}  # of a degree and the one before it
 _MORE = {4: 7.0, 2: 12.0}  # the same, less its own, by any two degrees more, where there is no such fit
-_ONE_SIDED = 4.0  # times that at most where such a fit is one-sided
+# Times that at most where such a fit is one-sided, and the same where it is hardly determined, as measured
+# along borders: of what magnifies noise most a smooth surface has least.
+_ONE_SIDED, _HARDLY = 2.0, 2.0
 _NEXT = 3.0  # times the square of what noise grows to by degree 6, by degree 8
 # Shares of the noise's square: what terms may be off by chance, and what noise may grow by with every ring.
 _CHANCE, _UNEVEN = 0.2, 0.02
 # Times the bias as it seems that of H, K, k1 and k2 is taken for in intervals: terms that are alike round the
-# vertex, as on humps, give H more than others, and principal curvatures more still.
-_CAUTION = np.array((1.2, 1.2, 1.9, 1.9))
+# vertex, as on humps, give H more than others, and principal curvatures more still. The same of the square
+# of what one fit differs from another beyond noise.
+_CAUTION = np.array((1.55, 1.3, 2.3, 2.3))
+_BEYOND = 1.7
 # Times its square that of bias counts in the risk: it is known less well than noise.
 _DOUBT = 2.0
 _ALIKE = 5.0  # vertices whose residuals are one another's
@@ -70,7 +75,7 @@ def least_risks(
         fits = around.polynomials(vertices[at], 6, r, ghosts=False, kind=kernel.ROUND, nested=3)
         if noise2.size == 0:  # all have begun
             of = fits[0][:, [kernel.SQUARE, kernel.FREEDOM]]
-            of = np.where(sound(fits[0], 6)[:, None], of, np.nan)
+            of = np.where(of[:, 1:] > 0, of, np.nan)  # a fit that magnifies noise tells of it
             square, freedom = spread(around, vertices, of, _NOISE).T
             noise2 = square / freedom
         candidates = list(_candidates(around, vertices[at], r, noise2[at], fits))
@@ -83,7 +88,7 @@ def least_risks(
         beyond = (new - values[at]) ** 2 - np.maximum(gains2[at] - gain2, 0.0) * noise2[at, None]
         better = risk < least[at]
         beyond = spread(around, vertices[at], np.where(better[:, None], beyond, np.nan), _POOL)
-        bias2 = np.fmax(most2[:, None] * gain2 / gain2[:, :1] * _CAUTION**2, beyond)
+        bias2 = np.fmax(most2[:, None] * gain2 / gain2[:, :1] * _CAUTION**2, _BEYOND * beyond)
         bias = np.sqrt(np.fmax(bias2, 0.0))
         for k, c in enumerate(candidates):
             now = (best == k) & better
@@ -102,7 +107,8 @@ def _candidates(
 
     six, four, two = fits
     excess = six[:, kernel.SQUARE] - six[:, kernel.FREEDOM] * noise2
-    of = np.where(sound(six, 6)[:, None], np.stack((excess, six[:, kernel.FREEDOM]), axis=1), np.nan)
+    of = np.stack((excess, six[:, kernel.FREEDOM]), axis=1)
+    of = np.where(of[:, 1:] > 0, of, np.nan)
     excess, freedom = np.nan_to_num(spread(around, vertices, of, _POOL)).T
     chance = noise2 * np.sqrt(freedom / _ALIKE)
     share = _NEXT / _TERMS[8] * six[:, kernel.GAIN] ** 2
@@ -112,13 +118,17 @@ def _candidates(
     yield before
     for degree, lower in ((4, four), (2, two)):
         explained = before.fits[:, kernel.LOWER] - before.fits[:, kernel.SQUARE]
-        explained = np.where(before.good, explained, np.nan)[:, None]
+        explained = np.where(before.fits[:, kernel.FREEDOM] > 0, explained, np.nan)[:, None]
         per_term = spread(around, vertices, explained, _POOL)[:, 0] / _TERMS[degree + 2]
         excess = np.maximum(per_term - (1 + _CHANCE) * noise2, 0.0)
         gain2 = lower[:, kernel.GAIN] ** 2
         most = _MORE[degree] * gain2
-        less = np.where(before.good, np.clip(before.gain2 - gain2, 0.0, _ONE_SIDED * most), most)
-        seen = excess * less + np.nan_to_num(before.bias2)
+        less = np.clip(before.gain2 - gain2, 0.0, _ONE_SIDED * most)
+        known = np.isfinite(before.fits[:, kernel.CONDITION])
+        less = np.where(before.good, less, np.where(known, _HARDLY * gain2, most))
+        # Where the fit before is hardly determined its own bias is that of what this one does not look at.
+        share = np.minimum(1.0, (gain2 + most) / before.gain2)
+        seen = excess * less + np.nan_to_num(share * before.bias2)
         most = np.maximum(per_term - noise2, 0.0) * less + np.nan_to_num(before.most2 * gain2 / before.gain2)
         before = Candidate(lower, degree, seen, most, noise2)
         yield before

@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 import scipy
 
+from quadcurv.boundary import tangent_frames
 from quadcurv.schemes import averaged
 from quadcurv.schemes.base import Curvatures, Neighbourhoods, StandardErrors
 from quadcurv.schemes.quadric import quadrics
@@ -38,6 +39,11 @@ _RESOLVED = 5.0
 # Where noise prevails of which nobody near knows how large it is.
 _MORE = ((4, 3), (4, 4), (4, 5), (2, 3), (2, 4))
 _QUANTILE = 0.975
+# H through the vertex differs from H of a surface that passes it by 0.6 times what noise makes of H, so says
+# noise, and by less where what residuals are left is the surface's own: then H is off by up to 1.9 times as
+# much, K, k1 and k2 by up to 3. What is left between, so many times the difference counts as that of noise.
+_SEEN = np.array((2.5, 3.8, 3.8, 3.8))
+_NEAR, _INSIDE = 4, 3  # rings over which that is looked at, and rings to the border from which on
 _SMALLER = ((4, 2), (2, 1))
 _AT_ONCE = 2**13  # vertices that quadrics are fitted at
 _EXACT = 1e-3  # of the residuals of quadratic fits: all lie on one quadric
@@ -72,9 +78,10 @@ class _Found:
         from quadcurv.kernels import jet as kernel
 
         n = around.wanted.size
-        self.kernel = kernel
+        self.around, self.kernel = around, kernel
         self.values = np.full((kernel.COLUMNS, n), np.nan).T
         self.degree, self.rings = np.zeros((2, n), np.int32)
+        self.is_smooth = np.zeros(n, bool)
         self.sigma, self.freedom = np.full((2, n), np.nan)
         self.bias = np.full((4, n), np.nan).T
 
@@ -86,7 +93,7 @@ class _Found:
             self.values = fits
         else:
             self.values[at] = fits
-        self.degree[at], self.rings[at] = d, r
+        self.degree[at], self.rings[at], self.is_smooth[at] = d, r, True
         square = np.divide(
             fits[:, kernel.SQUARE], share * left, out=np.full(len(fits), np.nan), where=left > 0
         )
@@ -97,7 +104,7 @@ class _Found:
 
     def put_noisy(self, at: Indices, fits: Floats, d: int, r: int, noise: Floats, bias: Any) -> None:
         """Results of fits by plain least squares, and their bias."""
-        self.values[at], self.degree[at], self.rings[at] = fits, d, r
+        self.values[at], self.degree[at], self.rings[at], self.is_smooth[at] = fits, d, r, False
         self.sigma[at], self.freedom[at] = noise, np.maximum(fits[:, self.kernel.FREEDOM], 1.0)
         self.bias[at] = bias
 
@@ -105,14 +112,38 @@ class _Found:
         """Nothing is known again."""
         for values in (self.values, self.sigma, self.freedom, self.bias):
             values[at] = np.nan
-        self.degree[at] = self.rings[at] = 0
+        self.degree[at] = self.rings[at] = self.is_smooth[at] = 0
 
     def errors(self, at: Any = slice(None)) -> Floats:
-        """(k, 4): half of intervals that hold the exact values in 95 % of cases."""
+        """(k, 4): half of intervals that hold the exact values in 95 % of cases, were all residuals noise."""
         gain = self.values[at, self.kernel.GAIN : self.kernel.GAIN + 4]
-        freedom, places = np.unique(self.freedom[at], return_inverse=True)  # they are few
-        noise = scipy.special.stdtrit(freedom, _QUANTILE)[places, None] * gain * self.sigma[at, None]
+        noise = self._quantile(at)[:, None] * gain * self.sigma[at, None]
         return np.hypot(np.nan_to_num(noise), 2 * self.bias[at])
+
+    def _quantile(self, at: Any) -> Floats:
+        """(k,): of Student's t."""
+        freedom = self.freedom[at]
+        few = np.unique(freedom)
+        return np.asarray(scipy.special.stdtrit(few, _QUANTILE)[np.searchsorted(few, freedom)])
+
+    def intervals(self) -> Floats:
+        """(n, 4): the same, residuals being noise as far as they also move surfaces off their vertices."""
+        kernel, around, out = self.kernel, self.around, self.errors()
+        inside = around.on_border.astype(np.float64)[:, None]
+        for _ in range(_INSIDE):
+            inside = around.pooled(inside)
+        at = np.flatnonzero(self.is_smooth & (inside[:, 0] == 0))
+        if at.size == 0:
+            return out
+        gain = self.values[at, kernel.GAIN : kernel.GAIN + 4]
+        off = np.full((len(out), 1), np.nan)
+        off[at, 0] = (self.values[at, kernel.BIAS] / gain[:, 0]) ** 2
+        for _ in range(_NEAR):
+            off = around.pooled(off)
+        sigma = np.fmin(self.sigma[at, None], _SEEN * np.sqrt(off[at]))
+        noise = self._quantile(at)[:, None] * gain * sigma
+        out[at] = np.hypot(np.nan_to_num(noise), self.bias[at])
+        return out
 
     def doubt(self, at: Indices, rounding: float) -> Floats:
         """Errors of H over the curvature, 0 where they are rounding."""
@@ -127,7 +158,7 @@ class _Found:
         return unpacked(
             self.values,
             standard_error=StandardErrors(*(gain * self.sigma[:, None]).T),
-            interval=StandardErrors(*self.errors().T),
+            interval=StandardErrors(*self.intervals().T),
             noise=self.sigma,
             degree=self.degree,
             rings=self.rings,
@@ -154,10 +185,11 @@ def chosen(around: Neighbourhoods) -> Curvatures:
     unresolved = good & ~_resolved(fits, 6, around.rounding)
     at = slice(None) if good.all() else good
     found.put(vertices[at], fits[at], 6, 3)
-    noisy = np.concatenate((vertices[unresolved], _at_sides(around, vertices[~good], fits[~good], found)))
+    noisy, untold = _at_sides(around, vertices[~good], fits[~good], found)
+    noisy = np.concatenate((vertices[unresolved], noisy))
     if noisy.size:
         steep = vertices[np.isnan(fits[:, kernel.CONDITION]) | (found.degree[vertices] <= 2)]
-        noisy = _in_noise(around, vertices, steep, noisy)
+        noisy = _in_noise(around, vertices, np.union1d(steep, untold), noisy)
         _average(around, noisy, found)
     _doubted(around, np.setdiff1d(vertices[good], noisy), found)
     doubted = ~(found.doubt(vertices, around.rounding) <= np.where(good, _DOUBT, 0.0))
@@ -203,15 +235,15 @@ def _quadrics(around: Neighbourhoods, vertices: Indices, found: _Found) -> None:
         found.put_noisy(at, fits, 2, 3, fits[:, kernel.SIGMA], apart)
 
 
-def _in_noise(around: Neighbourhoods, vertices: Indices, steep: Indices, noisy: Indices) -> Indices:
-    """Noisy vertices, those nearly all of whose neighbours are, and steep ones where most of the others are.
+def _in_noise(around: Neighbourhoods, vertices: Indices, untold: Indices, noisy: Indices) -> Indices:
+    """Noisy vertices, those nearly all of whose neighbours are, and untold ones where most of the others are.
 
     But for those most of whose neighbours are not: noise of one vertex is seen from all around, so that there
     it is chance, or a corner's ghosts.
     """
     evidence = np.full(around.wanted.size, np.nan)
     evidence[vertices] = 0.0
-    evidence[steep], evidence[noisy] = np.nan, 1.0
+    evidence[untold], evidence[noisy] = np.nan, 1.0
     chosen, nearest = np.zeros(evidence.size, bool), np.full(evidence.size, np.nan)
     for rings in range(1, _FAR + 1):
         evidence = around.pooled(evidence[:, None])[:, 0]
@@ -221,14 +253,18 @@ def _in_noise(around: Neighbourhoods, vertices: Indices, steep: Indices, noisy: 
             noisy = noisy[evidence[noisy] > _MOST]
         if rings > 2:  # what is nearest counts, however far others have to look
             nearest = np.where(np.isnan(nearest), evidence, nearest)
-            if np.isfinite(nearest[steep]).all():
+            if np.isfinite(nearest[untold]).all():
                 break
-    chosen[steep] |= nearest[steep] > _MOST
+    chosen[untold] |= nearest[untold] > _MOST
     return np.union1d(noisy, np.flatnonzero(chosen))
 
 
-def _at_sides(around: Neighbourhoods, vertices: Indices, first: Floats, found: _Found) -> Indices:
-    """Fits where three rings do not do, at rough borders above all; those vertices where noise prevails.
+def _at_sides(
+    around: Neighbourhoods, vertices: Indices, first: Floats, found: _Found
+) -> tuple[Indices, Indices]:
+    """Fits where three rings do not do, at rough borders above all.
+
+    Then those vertices where noise prevails, and those of which nothing but what completes them tells.
 
     One-sided fits over more rings, and fits to neighbourhoods completed by a surface fitted at the border:
     that of the least error, as far as they and their neighbours can tell.
@@ -236,9 +272,9 @@ def _at_sides(around: Neighbourhoods, vertices: Indices, first: Floats, found: _
     from quadcurv.kernels import jet as kernel
 
     if vertices.size == 0:
-        return vertices
+        return vertices, vertices
     n = around.wanted.size
-    fits, beyond, errors, noisy = [], [], [], np.zeros(vertices.size, bool)
+    fits, beyond, errors, (noisy, told) = [], [], [], np.zeros((2, vertices.size), bool)
     for d, r, ghosts in _SIDES:
         here = first if (d, r) == (6, 3) else around.polynomials(vertices, d, r, ghosts, kernel.SMOOTH)
         good = (here[:, kernel.CONDITION] <= _ONE_SIDED[d, r]) & (here[:, kernel.FREEDOM] > _FREE)
@@ -248,7 +284,7 @@ def _at_sides(around: Neighbourhoods, vertices: Indices, first: Floats, found: _
         at = np.flatnonzero(good)
         resolved = _resolved(here[at], d, around.rounding)
         if not ghosts:
-            noisy[at[~resolved]] = True
+            noisy[at[~resolved]], told[at] = True, True
             at = at[resolved]
         beyond.append(np.nan_to_num(around.border_error(r)[vertices]) if ghosts else np.zeros(vertices.size))
         found.put(vertices[at], here[at], d, r, beyond[-1][at])
@@ -278,7 +314,7 @@ def _at_sides(around: Neighbourhoods, vertices: Indices, first: Floats, found: _
         todo = todo[~good]
     if todo.size:
         _spheres(around, vertices[todo], found)
-    return vertices[noisy]
+    return vertices[noisy], vertices[~told]
 
 
 def _spheres(around: Neighbourhoods, vertices: Indices, found: _Found) -> None:
@@ -293,14 +329,11 @@ def _spheres(around: Neighbourhoods, vertices: Indices, found: _Found) -> None:
         H = -2 * np.nansum(height * square, axis=1) / np.nansum(square**2, axis=1)
     known = np.isfinite(H) & np.isfinite(n).all(axis=1) & ((square > 0).sum(axis=1) >= 3)
     at, H, n = vertices[known], H[known], n[known]
-    # The axis least along the normal, less its part along it.
-    one = np.eye(3)[np.argmin(np.abs(n), axis=1)]
-    one -= np.einsum("kx,kx->k", one, n)[:, None] * n
-    one /= np.linalg.norm(one, axis=1, keepdims=True)
+    one, other, _ = tangent_frames(n).swapaxes(0, 1)
     values = found.values
     values[at, kernel.MEAN], values[at, kernel.GAUSSIAN] = H, H**2
     values[at, kernel.K1], values[at, kernel.K2] = H, H
-    values[at, kernel.DIRECTION1], values[at, kernel.DIRECTION2] = one, np.cross(n, one)
+    values[at, kernel.DIRECTION1], values[at, kernel.DIRECTION2] = one, other
     values[at, kernel.NORMAL] = n
     found.degree[at] = found.rings[at] = 1
 
