@@ -34,8 +34,9 @@ _FREE = 2  # points more than terms, with which a one-sided fit still passes thr
 _LEFT = {6: (0.41, 0.67), 4: (0.31, 0.62), 2: (0.06, 0.57)}
 # Of the squares of all heights: less is the rounding of what the terms are taken from.
 _DIGITS = 2.0**-46
-# Times what noise explains with as many terms, from which on terms are the surface's.
-_RESOLVED = 5.0
+# Times what noise explains with as many terms, from which on terms are the surface's, and from which on noise
+# is so little that no fit over more rings is better.
+_RESOLVED, _CLEARLY = 5.0, 15.0
 # Where noise prevails of which nobody near knows how large it is.
 _MORE = ((4, 3), (4, 4), (4, 5), (2, 3), (2, 4))
 _QUANTILE = 0.975
@@ -107,6 +108,11 @@ class _Found:
         self.values[at], self.degree[at], self.rings[at], self.is_smooth[at] = fits, d, r, False
         self.sigma[at], self.freedom[at] = noise, np.maximum(fits[:, self.kernel.FREEDOM], 1.0)
         self.bias[at] = bias
+
+    def take(self, other: _Found, at: Indices) -> None:
+        """Results of another."""
+        for name in ("values", "degree", "rings", "is_smooth", "sigma", "freedom", "bias"):
+            getattr(self, name)[at] = getattr(other, name)[at]
 
     def clear(self, at: Indices) -> None:
         """Nothing is known again."""
@@ -183,6 +189,7 @@ def chosen(around: Neighbourhoods) -> Curvatures:
     fits = around.polynomials(vertices, 6, 3, kind=kernel.SMOOTH)
     good = (fits[:, kernel.CONDITION] <= _CONDITION[6]) & np.isnan(around.border_error(3)[vertices])
     unresolved = good & ~_resolved(fits, 6, around.rounding)
+    hardly = good & ~unresolved & ~_resolved(fits, 6, around.rounding, _CLEARLY)
     at = slice(None) if good.all() else good
     found.put(vertices[at], fits[at], 6, 3)
     noisy, untold = _at_sides(around, vertices[~good], fits[~good], found)
@@ -190,7 +197,7 @@ def chosen(around: Neighbourhoods) -> Curvatures:
     if noisy.size:
         steep = vertices[np.isnan(fits[:, kernel.CONDITION]) | (found.degree[vertices] <= 2)]
         noisy = _in_noise(around, vertices, np.union1d(steep, untold), noisy)
-        _average(around, noisy, found)
+    noisy = _average(around, noisy, np.setdiff1d(vertices[hardly], noisy), found)
     _doubted(around, np.setdiff1d(vertices[good], noisy), found)
     doubted = ~(found.doubt(vertices, around.rounding) <= np.where(good, _DOUBT, 0.0))
     _quadrics(around, np.setdiff1d(vertices[doubted], noisy), found)
@@ -338,7 +345,7 @@ def _spheres(around: Neighbourhoods, vertices: Indices, found: _Found) -> None:
     found.degree[at] = found.rings[at] = 1
 
 
-def _resolved(fits: Floats, d: int, rounding: float) -> Bools:
+def _resolved(fits: Floats, d: int, rounding: float, times: float = _RESOLVED) -> Bools:
     """Whether terms of the two highest degrees explain more than noise would, or the rest is rounding."""
     from quadcurv.kernels import jet as kernel
 
@@ -346,23 +353,28 @@ def _resolved(fits: Floats, d: int, rounding: float) -> Bools:
     explained = (fits[:, kernel.LOWER] - fits[:, kernel.SQUARE]) * np.maximum(freedom, 1.0)
     exact = fits[:, kernel.SQUARE] <= rounding**2 * np.maximum(freedom, 1.0)
     exact |= fits[:, kernel.SQUARE] <= _DIGITS * fits[:, kernel.WHOLE]
-    return exact | (explained > _RESOLVED * terms * fits[:, kernel.SQUARE])
+    return exact | (explained > times * terms * fits[:, kernel.SQUARE])
 
 
-def _average(around: Neighbourhoods, vertices: Indices, found: _Found) -> None:
-    """Take plain least squares at noisy vertices."""
-    from quadcurv.kernels import jet as kernel
+def _average(around: Neighbourhoods, noisy: Indices, hardly: Indices, found: _Found) -> Indices:
+    """Take plain least squares at noisy vertices, and where more rings are better for hardly resolved ones.
 
-    left = np.zeros(around.wanted.size, bool)
-    left[vertices] = True
+    What is not noise grows with the rings far faster than fits over them gain.
+    """
+    vertices, other = np.union1d(noisy, hardly), _Found(around)
+    if vertices.size == 0:
+        return vertices
     for at, fits, d, r, noise2, bias in averaged.least_risks(around, vertices):
-        found.put_noisy(at, fits, d, r, np.sqrt(noise2), bias)
-        left[at] = False
-    todo = np.flatnonzero(left)
+        other.put_noisy(at, fits, d, r, np.sqrt(noise2), bias)
+    todo = noisy[other.degree[noisy] == 0]
     for d, r in _MORE:
         if todo.size == 0:
-            return
+            break
         fits = averaged.rounded(around, d, r, todo)
         good = averaged.sound(fits, d)
-        found.put_noisy(todo[good], fits[good], d, r, fits[good, kernel.SIGMA], 0.0)
+        other.put_noisy(todo[good], fits[good], d, r, fits[good, found.kernel.SIGMA], 0.0)
         todo = todo[~good]
+    better = other.errors(hardly)[:, 0] < found.errors(hardly)[:, 0]
+    taken = np.union1d(noisy[other.degree[noisy] > 0], hardly[better & (other.rings[hardly] > 3)])
+    found.take(other, taken)
+    return np.union1d(noisy, taken)
