@@ -129,8 +129,10 @@ class _Found:
     def _quantile(self, at: Any) -> Floats:
         """(k,): of Student's t."""
         freedom = self.freedom[at]
-        few = np.unique(freedom)
-        return np.asarray(scipy.special.stdtrit(few, _QUANTILE)[np.searchsorted(few, freedom)])
+        few = np.sort(freedom[np.isfinite(freedom)])
+        few = few[np.diff(few, prepend=-1.0) > 0]
+        of_few = np.append(scipy.special.stdtrit(few, _QUANTILE), np.nan)
+        return of_few[np.searchsorted(few, freedom)]
 
     def intervals(self) -> Floats:
         """(n, 4): the same, residuals being noise as far as they also move surfaces off their vertices."""
@@ -192,15 +194,19 @@ def chosen(around: Neighbourhoods) -> Curvatures:
     hardly = good & ~unresolved & ~_resolved(fits, 6, around.rounding, _CLEARLY)
     at = slice(None) if good.all() else good
     found.put(vertices[at], fits[at], 6, 3)
-    noisy, untold = _at_sides(around, vertices[~good], fits[~good], found)
-    noisy = np.concatenate((vertices[unresolved], noisy))
-    if noisy.size:
-        steep = vertices[np.isnan(fits[:, kernel.CONDITION]) | (found.degree[vertices] <= 2)]
-        noisy = _in_noise(around, vertices, np.union1d(steep, untold), noisy)
-    noisy = _average(around, noisy, np.setdiff1d(vertices[hardly], noisy), found)
-    _doubted(around, np.setdiff1d(vertices[good], noisy), found)
-    doubted = ~(found.doubt(vertices, around.rounding) <= np.where(good, _DOUBT, 0.0))
-    _quadrics(around, np.setdiff1d(vertices[doubted], noisy), found)
+    n = around.wanted.size
+    noisy, untold, hard, sure = np.zeros((4, n), bool)
+    at_sides = _at_sides(around, vertices[~good], fits[~good], found)
+    noisy[at_sides[0]], untold[at_sides[1]] = True, True
+    noisy[vertices[unresolved]], hard[vertices[hardly]], sure[vertices[good]] = True, True, True
+    if noisy.any():
+        untold[vertices[np.isnan(fits[:, kernel.CONDITION]) | (found.degree[vertices] <= 2)]] = True
+        noisy = _in_noise(around, vertices, untold, noisy)
+    noisy = _average(around, noisy, hard & ~noisy, found)
+    _doubted(around, np.flatnonzero(sure & ~noisy), found)
+    vertices = vertices[~noisy[vertices]]
+    least = np.where(sure[vertices], _DOUBT, 0.0)
+    _quadrics(around, vertices[~(found.doubt(vertices, around.rounding) <= least)], found)
     return found.curvatures(around.on_crease)
 
 
@@ -242,7 +248,7 @@ def _quadrics(around: Neighbourhoods, vertices: Indices, found: _Found) -> None:
         found.put_noisy(at, fits, 2, 3, fits[:, kernel.SIGMA], apart)
 
 
-def _in_noise(around: Neighbourhoods, vertices: Indices, untold: Indices, noisy: Indices) -> Indices:
+def _in_noise(around: Neighbourhoods, vertices: Indices, untold: Bools, noisy: Bools) -> Bools:
     """Noisy vertices, those nearly all of whose neighbours are, and untold ones where most of the others are.
 
     But for those most of whose neighbours are not: noise of one vertex is seen from all around, so that there
@@ -251,19 +257,18 @@ def _in_noise(around: Neighbourhoods, vertices: Indices, untold: Indices, noisy:
     evidence = np.full(around.wanted.size, np.nan)
     evidence[vertices] = 0.0
     evidence[untold], evidence[noisy] = np.nan, 1.0
-    chosen, nearest = np.zeros(evidence.size, bool), np.full(evidence.size, np.nan)
+    found, nearest = np.zeros(evidence.size, bool), np.full(evidence.size, np.nan)
     for rings in range(1, _FAR + 1):
         evidence = around.pooled(evidence[:, None])[:, 0]
         if rings == 2:
-            chosen[vertices] = evidence[vertices] > _NEARLY_ALL
+            found[vertices] = evidence[vertices] > _NEARLY_ALL
         if rings == 3:
-            noisy = noisy[evidence[noisy] > _MOST]
+            found |= noisy & (evidence > _MOST)
         if rings > 2:  # what is nearest counts, however far others have to look
             nearest = np.where(np.isnan(nearest), evidence, nearest)
             if np.isfinite(nearest[untold]).all():
                 break
-    chosen[untold] |= nearest[untold] > _MOST
-    return np.union1d(noisy, np.flatnonzero(chosen))
+    return found | (untold & (nearest > _MOST))
 
 
 def _at_sides(
@@ -356,17 +361,17 @@ def _resolved(fits: Floats, d: int, rounding: float, times: float = _RESOLVED) -
     return exact | (explained > times * terms * fits[:, kernel.SQUARE])
 
 
-def _average(around: Neighbourhoods, noisy: Indices, hardly: Indices, found: _Found) -> Indices:
+def _average(around: Neighbourhoods, noisy: Bools, hardly: Bools, found: _Found) -> Bools:
     """Take plain least squares at noisy vertices, and where more rings are better for hardly resolved ones.
 
     What is not noise grows with the rings far faster than fits over them gain.
     """
-    vertices, other = np.union1d(noisy, hardly), _Found(around)
+    vertices, other = np.flatnonzero(noisy | hardly), _Found(around)
     if vertices.size == 0:
-        return vertices
+        return noisy
     for at, fits, d, r, noise2, bias in averaged.least_risks(around, vertices):
         other.put_noisy(at, fits, d, r, np.sqrt(noise2), bias)
-    todo = noisy[other.degree[noisy] == 0]
+    todo = np.flatnonzero(noisy & (other.degree == 0))
     for d, r in _MORE:
         if todo.size == 0:
             break
@@ -374,7 +379,10 @@ def _average(around: Neighbourhoods, noisy: Indices, hardly: Indices, found: _Fo
         good = averaged.sound(fits, d)
         other.put_noisy(todo[good], fits[good], d, r, fits[good, found.kernel.SIGMA], 0.0)
         todo = todo[~good]
-    better = other.errors(hardly)[:, 0] < found.errors(hardly)[:, 0]
-    taken = np.union1d(noisy[other.degree[noisy] > 0], hardly[better & (other.rings[hardly] > 3)])
-    found.take(other, taken)
-    return np.union1d(noisy, taken)
+    at = np.flatnonzero(hardly & (other.rings > 3))
+    better = at[other.errors(at)[:, 0] < found.errors(at)[:, 0]]
+    found.take(other, np.flatnonzero(noisy & (other.degree > 0)))
+    found.take(other, better)
+    noisy = noisy.copy()
+    noisy[better] = True
+    return noisy
