@@ -27,12 +27,12 @@ from numpy.typing import NDArray
 from quadcurv.boundary.cells import cell_ghosts, cells_at_poles, cells_within, closed_cells
 from quadcurv.boundary.closing import EXTRAPOLATED, FITTED, INTERIOR, OPEN, REACH, closed
 from quadcurv.boundary.mirror import mirrored
-from quadcurv.boundary.poles import closed_grid, parts_at_poles, poles, welded
+from quadcurv.boundary.poles import parts_at_poles, poles, poles_of_faces, welded, welded_faces
 from quadcurv.boundary.sides import frame, ghost_layer, part_around
 from quadcurv.boundary.strips import ghosts
 from quadcurv.boundary.strips import roughness as rough_lines
 from quadcurv.boundary.surface import Surfaces, fitted, tangent_frames, wide
-from quadcurv.mesh import Mesh, QuadGrid, StaggeredGrid
+from quadcurv.mesh import Mesh, QuadGrid, QuadMesh, StaggeredGrid
 from quadcurv.stencils import Stencils
 from quadcurv.types import Floats
 
@@ -60,6 +60,7 @@ __all__ = [
     "part_around",
     "parts_at_poles",
     "poles",
+    "poles_of_faces",
     "roughness",
     "tangent_frames",
     "welded",
@@ -143,8 +144,13 @@ def _treated(mesh: Mesh, boundary: str) -> tuple[Stencils, NDArray[np.uint8]]:
     if isinstance(mesh, QuadGrid) and mesh.mask is not None:
         mesh = mesh.to_mesh()
     given = mesh.stencils()
+    at_poles = None
     if isinstance(mesh, QuadGrid) and (found := poles(mesh)) is not None:
-        treated, treatment = closed_grid(mesh, found)
+        at_poles = welded(mesh, found)
+    elif isinstance(mesh, QuadMesh) and (found := poles_of_faces(given, mesh.roundoff)) is not None:
+        at_poles = welded_faces(given, found), found
+    if at_poles is not None:
+        treated, treatment = closed(*at_poles)
         if boundary == "nan":
             treatment = np.where(given.closed, treatment, OPEN).astype(np.uint8)
             treated = replace(treated, closed=treatment != OPEN)

@@ -7,9 +7,9 @@ pole and the row beside it get their rings from fitted surfaces instead, without
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
+import scipy
 
-from quadcurv.boundary.closing import REACH, closed
+from quadcurv.boundary.closing import REACH
 from quadcurv.mesh import QuadGrid, StaggeredGrid
 from quadcurv.stencils import Stencils, grid_faces
 from quadcurv.types import Bools, Floats, Indices, Ints
@@ -66,17 +66,51 @@ def _of_runs(one: Bools, number: Indices) -> Indices:
     return pole
 
 
+@np.errstate(all="ignore")
+def poles_of_faces(stencils: Stencils, roundoff: float) -> Indices | None:
+    """Border vertices of a face list at a pole: (n,), the first one there, else -1; None if none is.
+
+    Those are joined by edges of no length, at least three of them.
+    """
+    faces, points, n = stencils.faces, stencils.points, stencils.n
+    if stencils.polygons is not None or stencils.closed.all():
+        return None
+    border = np.append(~stencils.closed, np.zeros(len(points) - n + 1, bool))
+    following = np.roll(faces, -1, axis=1)
+    following = np.where(following < 0, faces[:, :1], following)
+    row, slot = np.nonzero(border[faces] & border[following] & (faces >= 0))
+    a, b = faces[row, slot], following[row, slot]
+    size = np.abs(points[faces[row]] - points[a][:, None]).max(axis=2)
+    size = np.where(faces[row] >= 0, size, 0.0).max(axis=1)
+    most = _POINT * size + 16 * roundoff * np.abs(points[a]).max(axis=1)
+    one = (np.abs(points[a] - points[b]).max(axis=1) <= most) & (most < 1e-3 * size)
+    if not one.any():
+        return None
+    graph = scipy.sparse.coo_array((np.ones(one.sum(), bool), (a[one], b[one])), (n, n))
+    _, of = scipy.sparse.csgraph.connected_components(graph, directed=False)
+    _, first = np.unique(of, return_index=True)
+    many = np.bincount(of)[of] >= _LEAST
+    return np.where(many, first[of], -1) if many.any() else None
+
+
+def welded_faces(stencils: Stencils, pole: Indices) -> Stencils:
+    """Stencils of a face list with one vertex, and triangles, at each pole."""
+    vertex = np.append(np.where(pole >= 0, pole, np.arange(pole.size)), -1).astype(np.int32)
+    faces = vertex[stencils.faces]
+    triangle = faces[:, 3] < 0
+    a, b, c = faces[:, :3].T
+    kept = np.concatenate(
+        (_without_repetition(faces[~triangle]), faces[triangle & (a != b) & (b != c) & (c != a)])
+    )
+    return Stencils(stencils.points, kept, stencils.shape, stencils.closed, stencils.orientable)
+
+
 def welded(grid: QuadGrid, pole: Indices) -> tuple[Stencils, Indices]:
     """Stencils with one vertex and triangles at each pole; that vertex for each point of a pole, else -1."""
     vertex = np.where(pole >= 0, pole, np.arange(pole.size).reshape(pole.shape)).astype(np.int32)
     faces = grid_faces(np.pad(vertex, [(0, int(w)) for w in grid.wrap], mode="wrap"))
     given = grid.stencils()
     return Stencils(given.points, _without_repetition(faces), given.shape, given.closed), pole.ravel()
-
-
-def closed_grid(grid: QuadGrid, pole: Indices) -> tuple[Stencils, NDArray[np.uint8]]:
-    """Stencils with closed rings, each point of a pole with the same one, and what closes each."""
-    return closed(*welded(grid, pole))
 
 
 def parts_at_poles(grid: QuadGrid) -> list[tuple[Indices, QuadGrid, Bools]]:

@@ -11,7 +11,16 @@ from functools import partial
 import numpy as np
 import scipy
 
-from quadcurv.boundary import REACH, cells_at_poles, closed, frame, one_rings, part_around, parts_at_poles
+from quadcurv.boundary import (
+    REACH,
+    cells_at_poles,
+    closed,
+    frame,
+    one_rings,
+    part_around,
+    parts_at_poles,
+    poles_of_faces,
+)
 from quadcurv.device_arrays import taken
 from quadcurv.drivers import direct
 from quadcurv.mesh import QuadGrid, QuadMesh, StaggeredGrid
@@ -30,8 +39,11 @@ _CLOSED = Frame(_NOTHING, _NOTHING)  # what is beyond a grid is its other side
 def evaluate_faces(mesh: QuadMesh, scheme: Laplacian, boundary: str, results: Mapping[str, Floats]) -> None:
     """Regular vertices in one pass, the others from the stencils of the part of the mesh around them."""
     assert scheme.fast is not None
-    _evaluate_rings(mesh, scheme.fast, results)
     others, part = mesh.irregular_part()
+    if others.size and poles_of_faces(part, mesh.roundoff) is not None:  # rare: all of it the slow way
+        direct.evaluate(mesh.stencils(), one_rings(mesh, boundary), scheme, results)
+        return
+    _evaluate_rings(mesh, scheme.fast, results)
     if others.size:
         inner = {name: np.empty(part.shape + direct.PER_VERTEX[name]) for name in results}
         treated = closed(part)[0] if boundary == "extrapolate" else part
