@@ -127,8 +127,7 @@ def test_all_borders_of_cells_are_as_near_as_the_inside(name, damage, amount, sc
 @pytest.mark.parametrize("name", SURFACES)
 @pytest.mark.parametrize("n", [32, 48])
 def test_all_borders_are_as_near_as_the_inside(n, name, damage, amount, scheme):
-    # Beside first cells twice as wide a polynomial has twice as far to go.
-    as_near_as_inside(*damaged(name, n, damage, amount), scheme, 4.5 if amount > 1 else 3.0)
+    as_near_as_inside(*damaged(name, n, damage, amount), scheme)
 
 
 @pytest.mark.slow
@@ -137,7 +136,23 @@ def test_all_borders_are_as_near_as_the_inside(n, name, damage, amount, scheme):
 @pytest.mark.parametrize("name", SURFACES)
 def test_all_borders_of_face_lists_are_as_near_as_the_inside(name, damage, amount, scheme):
     grid, exact = damaged(name, 32, damage, amount)
-    as_near_as_inside(grid, exact, scheme, 4.5 if amount > 1 else 3.0, of=on_faces)
+    as_near_as_inside(grid, exact, scheme, of=on_faces)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("scheme", LAPLACIANS)
+@pytest.mark.parametrize(("damage", "amount"), DAMAGES)
+@pytest.mark.parametrize("name", SURFACES)
+def test_all_borders_of_mixed_faces_are_as_near_as_the_inside(name, damage, amount, scheme):
+    """Strips are cut short by triangles, so that nearly all rings are of surfaces fitted to one side.
+
+    Some schemes are nearly exact inside minimal surfaces on conformal grids, which that is not: up to 5 times
+    as far off, 11 times beside first cells that are wider than the others.
+    """
+    grid, exact = damaged(name, 32, damage, amount)
+    minimal = name in ("catenoid", "enneper")
+    bound = 3.0 if not minimal else 11.0 if amount > 1 else 5.0
+    as_near_as_inside(grid, exact, scheme, bound, of=on_mixed_faces)
 
 
 @pytest.mark.slow
@@ -356,12 +371,12 @@ def test_a_slit_ends_in_a_vertex_that_has_a_value():
 def test_borders_of_quads_and_triangles_by_turns(name, scheme, amount):
     """Rings completed by mirror images of triangles and quads were 20 to 1,000 times as far off."""
     grid, exact = damaged(name, 32, *amount)
-
-    def of(grid, scheme):
-        return qc.mean_curvature(some_cut(grid), scheme).reshape(grid.shape)
-
     # What is nearly exact inside a minimal surface on conformal grids is no measure of a one-sided fit.
-    as_near_as_inside(grid, exact, scheme, 5.0 if name in ("catenoid", "enneper") else 3.0, of=of)
+    as_near_as_inside(grid, exact, scheme, 5.0 if name in ("catenoid", "enneper") else 3.0, of=on_mixed_faces)
+
+
+def on_mixed_faces(grid, scheme):
+    return qc.mean_curvature(some_cut(grid), scheme).reshape(grid.shape)
 
 
 def some_cut(grid, seed=0):
