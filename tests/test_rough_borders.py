@@ -216,6 +216,17 @@ def test_second_order_beside_first_cells_of_another_width(ratio, end, along):
     assert errors[-1] < errors[0] / 6
 
 
+@pytest.mark.parametrize("ratio", [0.8, 0.9, 0.95, 1.05, 1.1])
+@pytest.mark.parametrize("scheme", ["liu", "bunge", "finite_volume"])
+def test_first_cells_that_are_nearly_as_wide_as_the_others(scheme, ratio):
+    """Lines on a coarse mesh looked smooth enough for ghosts by index, which were off by 0.2 of k = 2."""
+    surface = surfaces.enneper()
+    t = np.linspace(*surface.domain[0], 15)
+    s = np.concatenate(([t[1] - ratio * (t[1] - t[0])], t[1:]))
+    H = qc.mean_curvature(qc.QuadGrid(surface.mapping(*np.meshgrid(s, t, indexing="ij"))), scheme)
+    assert np.abs(H[0, 1:-1]).max() < 0.03
+
+
 def test_ghosts_by_length_and_by_index_agree_on_even_lines(rng):
     """Points on polynomials of length, straight lines: to rounding."""
     t = np.arange(6.0)

@@ -26,6 +26,8 @@ ROUNDING = 2.0**-95  # of coordinates, squared, as extrapolation magnifies it
 _EXPECTED = 9.0
 # And noise may cause no more than this part of the curvature there.
 _DOUBT = 0.03
+# What a sixth point changes by index where X_0 alone is out of step, is a part of what the ghost is off.
+_SHIFTED = 5.0
 # Where the last point changes less than the last but one there is little noise: then what a fitted surface
 # leaves at the points is but a third of what it misses beyond the border.
 _CALM, _FAITHFUL = 0.6, 0.1
@@ -104,7 +106,7 @@ def extended(lines: Floats, turn: Floats, degree: int, layers: int, beside: Indi
             rows = number == few
             by_length[rows] = continued(x[rows, :few], layers, ~every[rows])
         other, smooth = _error(terms, by_length, ends, degree)
-        by_index = even | (~smooth & (error <= other))
+        by_index = even | (~smooth & (_SHIFTED * error <= other))
         ghosts = np.where(by_index[:, None, None], ghosts, by_length)
         error = np.where(by_index, error, other)
     return Continued(lines[:, :1] + ghosts * size[:, None], error * size[:, 0], even | smooth, by_index)
