@@ -8,7 +8,7 @@ from dataclasses import replace
 import pytest
 
 from quadcurv.schemes import SCHEMES
-from tests import promise
+from tests import damages, promise
 
 
 def ends(seeds):
@@ -26,6 +26,17 @@ def test_nothing_is_wrong_in_silence():
 @pytest.mark.parametrize("part", range(10))
 def test_nothing_is_wrong_in_silence_in_many_cases(part):
     assert ends(range(1000 + 200 * part, 1200 + 200 * part))["right"] > 120
+
+
+def test_nothing_is_wrong_in_silence_at_borders_of_all_kinds():
+    assert ends(damages.LATER + seed for seed in range(120))["right"] > 80
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("part", range(10))
+def test_nothing_is_wrong_in_silence_at_borders_of_all_kinds_in_many_cases(part):
+    begin = damages.LATER + 1000 + 200 * part
+    assert ends(range(begin, begin + 200))["right"] > 120
 
 
 def test_a_wrong_number_would_be_seen(monkeypatch):
