@@ -10,6 +10,12 @@ import pytest
 from quadcurv.schemes import SCHEMES
 from tests import damages, promise
 
+# Near-even first cells of a coarse mesh (four), hanging nodes (four), a rough corner, rows at one place, and
+# among the later ones few points between holes.
+FOUND = [
+    2002244, 2055673, 2058114, 2098215, 1004176, 2009555, 2038958, 2065006, 2001546, 2034414, 10012217,
+]  # fmt: skip
+
 
 def ends(seeds):
     found = [promise.verdict(seed) for seed in seeds]
@@ -37,6 +43,11 @@ def test_nothing_is_wrong_in_silence_at_borders_of_all_kinds():
 def test_nothing_is_wrong_in_silence_at_borders_of_all_kinds_in_many_cases(part):
     begin = damages.LATER + 1000 + 200 * part
     assert ends(range(begin, begin + 200))["right"] > 120
+
+
+@pytest.mark.parametrize("seed", FOUND)
+def test_what_was_found_wrong(seed):
+    ends([seed])
 
 
 def test_a_wrong_number_would_be_seen(monkeypatch):

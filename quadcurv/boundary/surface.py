@@ -19,7 +19,9 @@ RINGS = 5
 _FITS = ((5, 5), (4, 4), (3, 3), (2, 2), (3, 4), (2, 3))
 ROOM = 128  # vertices of a neighbourhood
 _TURN = 5  # triangles, of which quads are two, around a vertex with points on nearly all sides
-_DETERMINED = 0.5  # error of points about the mirror images, in edges, from which on there is no surface
+# Error of points about the mirror images, in edges, or of the mean curvature, in their inverse, from which on
+# there is no surface.
+_DETERMINED = 0.5
 
 
 class Surfaces(NamedTuple):
@@ -99,8 +101,11 @@ def fitted(stencils: Stencils, vertices: Indices) -> Surfaces:
     noise = np.where(np.isfinite(noise), np.sqrt(shared), np.inf)
     with np.errstate(invalid="ignore"):  # an infinite one times nothing is none
         error = np.where(np.isfinite(noise), noise * gain, np.inf)
-    most = np.where(_wide(stencils, around, ring), _DETERMINED * _distance(stencils, around, ring), 0.0)
-    error = np.where(error < most[:, None], error, np.inf)
+    distance = _distance(stencils, around, ring)[:, None]
+    known = _wide(stencils, around, ring)[:, None] & (error < _DETERMINED * distance)
+    with np.errstate(invalid="ignore"):
+        known &= noise * found[..., kernel.BEND] * distance < _DETERMINED
+    error = np.where(known, error, np.inf)
     best = np.arange(k), np.argmin(error, axis=1)
     found = found[best]
     maps = found[:, kernel.MAP : kernel.COEFFICIENTS].reshape(k, 2, 2)
