@@ -212,7 +212,7 @@ def stiffness(
     indptr, others, rows = row_starts(stencils, scheme)
     if indptr[-1] > np.iinfo(np.int32).max:
         return direct.without_infinity(scheme.assemble(stencils)[0])
-    indptr = indptr.astype(np.int32)
+    indptr = indptr.astype(np.int32, copy=False)
     if out is None:
         arrays = np.empty(indptr[-1]), np.empty(indptr[-1], np.int32), indptr
         out = scipy.sparse.csr_array(arrays, (n, p))
@@ -234,7 +234,7 @@ def row_starts(
     from quadcurv.kernels import topology
 
     n, p, others = stencils.n, len(stencils.points), stencils.irregular
-    indptr = np.arange(0, 9 * n + 1, 9)
+    indptr = np.arange(0, 9 * n + 1, 9, np.int32 if 9 * n <= np.iinfo(np.int32).max else np.int64)
     if not others.size:
         return indptr, others, None
     size = np.full(n, 9)
@@ -245,8 +245,7 @@ def row_starts(
     rows = scipy.sparse.csr_array((rows.data, vertices[rows.indices], rows.indptr), (others.size, p))
     rows.sort_indices()
     size[others] = np.diff(rows.indptr)
-    np.cumsum(size, out=indptr[1:])
-    return indptr, others, rows
+    return np.append(0, np.cumsum(size)), others, rows
 
 
 def row_places(indptr: Indices, others: Indices, rows: scipy.sparse.csr_array) -> Indices:
