@@ -80,6 +80,14 @@ class Frame(NamedTuple):
     beside: Floats
 
 
+DOUBLE = 2.0**-53  # unit roundoff
+
+
+def coarse(roundoff: float) -> float:
+    """Square of how much larger a unit roundoff is than that of doubles, 1 at least."""
+    return max(1.0, (roundoff / DOUBLE) ** 2)
+
+
 @dataclass(frozen=True, eq=False)
 class Stencils:
     """What a scheme reads: faces over points, and which of the points want a curvature.
@@ -98,6 +106,8 @@ class Stencils:
         False where no choice of sides agrees; normals then have an arbitrary sign.
     polygons : Polygons or None
         Faces of more than four sides, which `faces` has cut: for schemes that are made for polygons.
+    roundoff : float
+        Relative rounding error of the positions as they were given.
     """
 
     points: Floats
@@ -106,6 +116,12 @@ class Stencils:
     closed: Bools
     orientable: bool = True
     polygons: Polygons | None = None
+    roundoff: float = DOUBLE
+
+    @property
+    def coarse(self) -> float:
+        """Square of how much coarser positions are rounded than doubles: see `kernels.vector.rounding`."""
+        return coarse(self.roundoff)
 
     @property
     def n(self) -> int:
@@ -152,7 +168,7 @@ class Stencils:
             u, v = self.points[a] - self.points[c], self.points[b] - self.points[c]
             corner = np.column_stack((np.cross(u, v) / 4, (u**2 + v**2).sum(axis=1)))
             sums = scipy.sparse.csr_array((np.ones(c.size), np.arange(c.size), indptr)) @ corner
-        return faces.known_areas(self.points, sums)
+        return faces.known_areas(self.points, sums, self.coarse)
 
     @cached_property
     def corner_table(self) -> CornerTable:

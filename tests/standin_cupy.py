@@ -104,6 +104,8 @@ def _argument(x):
     if isinstance(x, ndarray):
         assert x.flags.c_contiguous
         return ctypes.c_void_p(x.ctypes.data)
+    if isinstance(x, np.float64):
+        return ctypes.c_double(x)
     return {np.uintp: ctypes.c_void_p, np.int64: ctypes.c_longlong, np.int32: ctypes.c_int}[type(x)](int(x))
 
 

@@ -354,3 +354,22 @@ def test_fits_through_all_points_know_nothing_of_their_errors(rng):
         error = np.abs(found.mean - surface.mean_curvature(u, v))
         known = np.isfinite(error)
         assert (error[known] < np.maximum(2.0, 2 * found.interval.mean[known])).all()
+
+
+@each_laplacian
+@pytest.mark.parametrize(("offset", "is_missing"), [(0.0, False), (900.0, True)])
+def test_slivers_of_grids_in_single_precision(scheme, offset, is_missing):
+    """A narrow row has an area in single precision near the origin and none farther away, on every path."""
+    x, y = np.meshgrid(np.linspace(0, 1, 12), np.linspace(0, 1, 12), indexing="ij")
+    points = np.stack((x, y, 0.2 * np.sin(3 * x) + 0.1 * y * y), axis=-1).astype(np.float32)
+    points[5] = points[6] - np.float32((1e-4, 0, 0))
+    points[..., 0] += np.float32(offset)
+    grid, double = qc.QuadGrid(points), qc.QuadGrid(points.astype(np.float64))
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", qc.PrecisionWarning)
+        found = [qc.mean_curvature(mesh, scheme).reshape(12, 12) for mesh in (grid, grid.to_mesh(), double)]
+    for H in found[:2]:
+        assert np.isnan(H[5, 3:-3]).all() == np.isnan(H[6, 3:-3]).all() == is_missing
+    one, other = (H[2:-2, 2:-2] for H in found[::2])
+    assert np.isfinite(other).all()
+    assert np.array_equal(one[np.isfinite(one)], other[np.isfinite(one)])

@@ -262,16 +262,17 @@ def test_progress_is_shown(tmp_path, capsys):
 
 @pytest.mark.filterwarnings("ignore::quadcurv.PrecisionWarning")
 def test_slivers_of_rounded_positions(tmp_path):
-    """No area but for the rounding of all positions, the largest of which another part has."""
+    """No area but for the rounding of its positions, however far those of other parts are."""
     points, faces = sheet(20, 12)
     points = points.astype(np.float32)
     points[36:48] = points[48:60] + np.float32([1e-4, 0, 0])
     points[-30:, 0] += 9000
-    one = qc.evaluate(qc.QuadMesh(points, faces), *WANTED)
-    assert np.isnan(one["mean_curvature"][40])
-    assert not np.isnan(qc.evaluate(qc.QuadMesh(points[:-60], faces[:150]), *WANTED)["mean_curvature"][40])
-    parts = qc.FaceParts(points, faces, tmp_path / "parts", parts=5)
-    check(one, qc.evaluate(parts, *WANTED))
+    for name, moved, is_missing in (("near", 0, False), ("far", 900, True)):
+        points[:-30, 0] += np.float32(moved)
+        one = qc.evaluate(qc.QuadMesh(points, faces), *WANTED)
+        assert np.isnan(one["mean_curvature"][40]) == is_missing
+        parts = qc.FaceParts(points, faces, tmp_path / name, parts=5)
+        check(one, qc.evaluate(parts, *WANTED))
 
 
 def test_isolated_vertices_and_parts_without_faces(tmp_path):

@@ -34,7 +34,8 @@ def closed(given: Stencils, pole: Indices | None = None) -> tuple[Stencils, NDAr
     if border.size == 0:
         return given, treatment
     vertices, faces = topology.part_around(given.faces, border, given.n, REACH)
-    part = Stencils(given.points[vertices], faces, vertices.shape, given.closed[vertices], given.orientable)
+    points, known = given.points[vertices], given.closed[vertices]
+    part = Stencils(points, faces, vertices.shape, known, given.orientable, roundoff=given.roundoff)
     layer = ghosts(part)
     if pole is None:
         star_of = _stars(part, layer)

@@ -6,6 +6,8 @@ pole and the row beside it get their rings from fitted surfaces instead, without
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import scipy
 
@@ -110,7 +112,7 @@ def welded(grid: QuadGrid, pole: Indices) -> tuple[Stencils, Indices]:
     vertex = np.where(pole >= 0, pole, np.arange(pole.size).reshape(pole.shape)).astype(np.int32)
     faces = grid_faces(np.pad(vertex, [(0, int(w)) for w in grid.wrap], mode="wrap"))
     given = grid.stencils()
-    return Stencils(given.points, _without_repetition(faces), given.shape, given.closed), pole.ravel()
+    return replace(given, faces=_without_repetition(faces)), pole.ravel()
 
 
 def parts_at_poles(grid: QuadGrid) -> list[tuple[Indices, QuadGrid, Bools]]:
@@ -134,7 +136,13 @@ def parts_at_poles(grid: QuadGrid) -> list[tuple[Indices, QuadGrid, Bools]]:
             of_side = around[:-2] | around[1:-1] | around[2:]
             np.moveaxis(beside, axis, 0)[[0, 1] if end == 0 else [-1, -2]] = of_side
             wrap = [w and i != axis for i, w in enumerate(grid.wrap)]
-            near.append((number[cut].ravel(), QuadGrid(grid.points[cut], wrap), beside.ravel()))
+            near.append(
+                (
+                    number[cut].ravel(),
+                    QuadGrid(grid.points[cut], wrap).with_roundoff(grid.roundoff),
+                    beside.ravel(),
+                )
+            )
     return near
 
 

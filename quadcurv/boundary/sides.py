@@ -149,4 +149,5 @@ def part_around(grid: QuadGrid, vertices: Indices, reach: int) -> tuple[Indices,
     i, j = np.divmod(kept, c)
     closed = (wrap[0] | ((i > 0) & (i < r - 1))) & (wrap[1] | ((j > 0) & (j < c - 1)))
     points = grid.points.reshape(-1, 3)[kept]
-    return kept, Stencils(points, np.ascontiguousarray(faces[(faces >= 0).all(axis=1)]), kept.shape, closed)
+    faces = np.ascontiguousarray(faces[(faces >= 0).all(axis=1)])
+    return kept, Stencils(points, faces, kept.shape, closed, roundoff=grid.roundoff)

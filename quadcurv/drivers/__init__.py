@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import copy
 from collections.abc import Iterable, Mapping
 from typing import TypeGuard
 
@@ -26,7 +25,6 @@ __all__ = ["apply", "arrays", "averaged", "checked_radius", "each", "fit", "has_
 # The quads of a staggered grid cover it twice, once for its cells and once for their corners: so that the
 # dual area of a cell is its area, matrix and areas are twice those of a mesh of these quads.
 _CELLS = 2.0
-DOUBLE = 2.0**-53  # unit roundoff
 
 
 def fit(mesh: Mesh | GridBlocks, scheme: Fit, boundary: str = "extrapolate") -> Curvatures:
@@ -46,12 +44,8 @@ def run(
     wanted: Iterable[str],
     boundary: str = "extrapolate",
     out: Mapping[str, Floats] | None = None,
-    size: float | None = None,
 ) -> dict[str, Floats]:
-    """Results by name (see `direct.PER_VERTEX`), into the arrays of `out` where there are any.
-
-    `size` is the largest coordinate of what the mesh is a part of.
-    """
+    """Results by name (see `direct.PER_VERTEX`), into the arrays of `out` where there are any."""
     if device.holds(mesh):
         return device.evaluate(mesh, scheme, wanted, boundary, out)  # type: ignore[arg-type]
     checked_boundary(boundary)
@@ -69,24 +63,7 @@ def run(
         compiled.evaluate_grid(mesh, scheme, boundary, results)
     if _of_cells(mesh) and "dual_areas" in results:
         results["dual_areas"] *= _CELLS
-    if (coarse := _coarse(mesh)) is not None:
-        far = run(far_away(coarse, mesh.roundoff, size), scheme, results.keys() - {"dual_areas"}, boundary)
-        for name, values in far.items():
-            results[name][np.isnan(values)] = np.nan
     return results
-
-
-def far_away(mesh: Mesh, roundoff: float, size: float | None = None) -> Mesh:
-    """The mesh so far from the origin that its positions are rounded, in double precision, as those given.
-
-    What has no area but for rounding is then NaN by the same test as everywhere.
-    """
-    moved, arrays = copy.copy(mesh), mesh.arrays()
-    if size is None:
-        size = max(float(np.abs(x).max()) for x in arrays.values())
-    far = {name: x + size * roundoff / DOUBLE for name, x in arrays.items()}
-    moved.__dict__.update(far, roundoff=DOUBLE)
-    return moved
 
 
 def stiffness(
@@ -111,18 +88,7 @@ def stiffness(
         matrix = assembled(mesh.stencils())
     if _of_cells(mesh):
         matrix.data *= _CELLS
-    if (coarse := _coarse(mesh)) is not None:
-        matrix.data[np.isnan(stiffness(far_away(coarse, mesh.roundoff), scheme).data)] = np.nan
     return matrix
-
-
-def _coarse(mesh: Mesh | GridBlocks) -> Mesh | None:
-    """The one mesh whose positions are rounded more coarsely than numbers are here, if there is one."""
-    if mesh.roundoff <= DOUBLE or has_holes(mesh):
-        return None
-    if isinstance(mesh, GridBlocks):
-        return None if mesh.of_cells else mesh.mesh
-    return mesh
 
 
 def _of_cells(mesh: Mesh | GridBlocks) -> bool:

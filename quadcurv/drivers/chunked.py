@@ -16,7 +16,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from quadcurv.boundary import checked_boundary
-from quadcurv.drivers import DOUBLE, answers
+from quadcurv.drivers import answers
 from quadcurv.drivers.progress import tracked
 from quadcurv.drivers.targets import checked_out, targets
 from quadcurv.drivers.tasks import BORDER, Task, with_holes
@@ -215,7 +215,7 @@ def _by_blocks(
     regions, size = [], None
     if not holes:
         _check_seams(grid)
-    if task.scaled or (grid.roundoff > DOUBLE and not holes):
+    if task.scaled:
         size = _size(grid)
     if not holes:
         for _, _, rows, columns in sides(grid, task):

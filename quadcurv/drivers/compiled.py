@@ -25,8 +25,8 @@ from quadcurv.device_arrays import taken
 from quadcurv.drivers import direct
 from quadcurv.mesh import QuadGrid, QuadMesh, StaggeredGrid
 from quadcurv.schemes import Diamond, Laplacian
-from quadcurv.stencils import Frame, Stencils
-from quadcurv.types import Floats, Indices
+from quadcurv.stencils import Frame, Stencils, coarse
+from quadcurv.types import Floats, Indices, Ints
 
 # Of one vertex of a face list and of one row of a matrix, in vertices of a grid.
 _RING_WORK, _ROW_WORK = 4, 8
@@ -153,8 +153,9 @@ def evaluate_rows(
             around, unserved = frame(grid, boundary)
             if boundary == "extrapolate":
                 unserved = np.union1d(unserved, cells_at_poles(grid))
-    given = (flat(around.beyond), flat(around.beside), *more, diamond_of.area == "quads", *_wanted(results))
-    over(partial(kernel, points, size, c, *given), r, r * c, LEAST_ROWS)
+    given = (flat(around.beyond), flat(around.beside), *more, coarse(grid.roundoff))
+    options = diamond_of.area == "quads", *_wanted(results)
+    over(partial(kernel, points, size, c, *given, *options), r, r * c, LEAST_ROWS)
     return unserved
 
 
@@ -189,7 +190,7 @@ def _evaluate_rings(mesh: QuadMesh, diamond_of: Diamond, results: Mapping[str, F
         found = [np.empty_like(values) for values in wanted]
     ring = connectivity.ring if order is None else order.ring
     far = order is None and connectivity.scattered
-    kernel = partial(rings.ring_curvatures, flat(points), flat(ring), far, liu, *found)
+    kernel = partial(rings.ring_curvatures, flat(points), flat(ring), far, coarse(mesh.roundoff), liu, *found)
     ranges.over(kernel, n, _RING_WORK * n, rings.BLOCK)
     if order is not None:
         # Reads from everywhere overlap, writes to everywhere wait: hence not straight to their places.
@@ -222,25 +223,30 @@ def stiffness(
         place = row_places(indptr, others, rows)
         out.indices[place], out.data[place] = rows.indices, rows.data
     points, ring = flat(stencils.points), flat(stencils.ring)
-    kernel = partial(rings.ring_stiffness, points, ring, flat(indptr), out.indices, out.data)
+    kernel = partial(rings.ring_stiffness, points, ring, stencils.coarse, flat(indptr), out.indices, out.data)
     ranges.over(kernel, n, _ROW_WORK * n, rings.BLOCK)
     return out
 
 
 def row_starts(
     stencils: Stencils, scheme: Laplacian
-) -> tuple[Indices, Indices, scipy.sparse.csr_array | None]:
+) -> tuple[Indices | Ints, Indices, scipy.sparse.csr_array | None]:
     """Where the rows of the stiffness begin (n + 1,), irregular vertices, and the rows of these if any."""
     from quadcurv.kernels import topology
 
     n, p, others = stencils.n, len(stencils.points), stencils.irregular
-    indptr = np.arange(0, 9 * n + 1, 9, np.int32 if 9 * n <= np.iinfo(np.int32).max else np.int64)
+    indptr: Indices | Ints
+    if 9 * n > np.iinfo(np.int32).max:
+        indptr = np.arange(0, 9 * n + 1, 9)
+    else:
+        indptr = np.arange(0, 9 * n + 1, 9, dtype=np.int32)
     if not others.size:
         return indptr, others, None
     size = np.full(n, 9)
     vertices, faces = topology.part_around(stencils.faces, others, p, 2)
     closed = np.zeros(vertices.size, bool)
-    part = Stencils(taken(stencils.points, vertices), faces, (vertices.size,), closed, stencils.orientable)
+    points, orientable = taken(stencils.points, vertices), stencils.orientable
+    part = Stencils(points, faces, vertices.shape, closed, orientable, roundoff=stencils.roundoff)
     rows = scipy.sparse.csr_array(direct.without_infinity(scheme.assemble(part)[0])[: others.size])
     rows = scipy.sparse.csr_array((rows.data, vertices[rows.indices], rows.indptr), (others.size, p))
     rows.sort_indices()
@@ -248,7 +254,7 @@ def row_starts(
     return np.append(0, np.cumsum(size)), others, rows
 
 
-def row_places(indptr: Indices, others: Indices, rows: scipy.sparse.csr_array) -> Indices:
+def row_places(indptr: Indices | Ints, others: Indices, rows: scipy.sparse.csr_array) -> Indices:
     """Where in all rows the entries of irregular ones stand."""
     return np.repeat(indptr[others] - rows.indptr[:-1], np.diff(rows.indptr)) + np.arange(rows.nnz)
 

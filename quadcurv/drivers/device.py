@@ -17,7 +17,7 @@ from quadcurv.device_arrays import as_cupy, is_on_device, on_host, taken
 from quadcurv.drivers import answers, compiled, direct
 from quadcurv.mesh import QuadGrid, QuadMesh
 from quadcurv.schemes import Fit, Laplacian, Scheme
-from quadcurv.stencils import Stencils
+from quadcurv.stencils import Stencils, coarse
 from quadcurv.types import Floats
 
 _THREADS = 64
@@ -78,7 +78,8 @@ def stiffness(mesh: QuadMesh | QuadGrid, scheme: Laplacian) -> Any:
     starts = as_cupy(indptr.astype(np.int32))
     data, indices = _empty(indptr[-1]), _empty(indptr[-1], np.int32)
     ring = as_cupy(stencils.ring) if isinstance(mesh, QuadGrid) else mesh.connectivity.ring_on_device
-    _launch("ring_stiffness", stencils.n, stencils.points, ring, starts, np.int64(stencils.n), indices, data)
+    sizes = np.int64(stencils.n), np.float64(stencils.coarse)
+    _launch("ring_stiffness", stencils.n, stencils.points, ring, starts, *sizes, indices, data)
     if rows is not None:
         place = as_cupy(compiled.row_places(indptr, others, rows))
         data[place], indices[place] = as_cupy(rows.data), as_cupy(rows.indices.astype(np.int32))
@@ -114,7 +115,7 @@ def evaluate_shape(mesh: QuadMesh | QuadGrid) -> tuple[int, ...]:
 
 def _evaluate_faces(mesh: QuadMesh, scheme: Laplacian, boundary: str, results: Mapping[str, Any]) -> None:
     n, ring = len(mesh.points), mesh.connectivity.ring_on_device
-    _launch("ring_curvatures", n, mesh.points, ring, np.int64(n), *_options(scheme, results))
+    _launch("ring_curvatures", n, mesh.points, ring, np.int64(n), *_options(mesh, scheme, results))
     others = mesh.connectivity.irregular
     if others.size:
         vertices, faces = mesh.connectivity.irregular_part
@@ -124,6 +125,7 @@ def _evaluate_faces(mesh: QuadMesh, scheme: Laplacian, boundary: str, results: M
             vertices.shape,
             mesh.connectivity.closed[vertices],
             mesh.orientable,
+            roundoff=mesh.roundoff,
         )
         inner = {name: np.empty(part.shape + direct.PER_VERTEX[name]) for name in results}
         direct.evaluate(part, closed(part)[0] if boundary == "extrapolate" else part, scheme, inner)
@@ -139,19 +141,20 @@ def _evaluate_grid(grid: QuadGrid, scheme: Laplacian, boundary: str, results: Ma
 
     (r, c), wrap = grid.shape, grid.wrap
     if any(not wraps and size < 2 * _COPIED for wraps, size in zip(wrap, grid.shape, strict=True)):
-        _copy(results, (slice(None), slice(None)), _on_host(grid.points, wrap, scheme, boundary, results))
+        whole = QuadGrid(on_host(grid.points), wrap).with_roundoff(grid.roundoff)
+        _copy(results, (slice(None), slice(None)), _on_host(whole, scheme, boundary, results))
         return
     number = -(-c // (WIDE * _THREADS)) * _THREADS * -(-r // HIGH)
     sizes = np.int64(r), np.int64(c), np.int32(wrap[0]), np.int32(wrap[1])
-    _launch("grid_curvatures", number, grid.points, *sizes, *_options(scheme, results))
+    _launch("grid_curvatures", number, grid.points, *sizes, *_options(grid, scheme, results))
     # Sides that are poles come last: strips along others end in a part of the pole.
     poles_copied: list[Callable[[], None]] = []
     for axis, end in ((axis, end) for axis in (0, 1) if not wrap[axis] for end in (0, -1)):
         along = (slice(None),) * axis
         copied, kept = (slice(0, n) if end == 0 else slice(-n, None) for n in (_COPIED, _TAKEN))
         strip_wrap = (wrap[0] and axis != 0, wrap[1] and axis != 1)
-        strip = QuadGrid(on_host(grid.points[(*along, copied)]), strip_wrap)
-        found = _on_host(strip.points, strip_wrap, scheme, boundary, results)
+        strip = QuadGrid(on_host(grid.points[(*along, copied)]), strip_wrap).with_roundoff(grid.roundoff)
+        found = _on_host(strip, scheme, boundary, results)
         at = (*along, kept)
         copy = partial(_copy, results, at, {name: values[at] for name, values in found.items()})
         pole = poles(strip)
@@ -164,10 +167,9 @@ def _evaluate_grid(grid: QuadGrid, scheme: Laplacian, boundary: str, results: Ma
 
 
 def _on_host(
-    points: Any, wrap: tuple[bool, bool], scheme: Laplacian, boundary: str, results: Mapping[str, Any]
+    grid: QuadGrid, scheme: Laplacian, boundary: str, results: Mapping[str, Any]
 ) -> dict[str, Floats]:
-    """What the host has for a grid."""
-    grid = QuadGrid(on_host(points), wrap)
+    """What the host has for a grid in its memory."""
     found = {name: np.empty((*grid.shape, *direct.PER_VERTEX[name])) for name in results}
     compiled.evaluate_grid(grid, scheme, boundary, found)
     return found
@@ -189,11 +191,15 @@ def _launch(name: str, number: int, *arguments: Any) -> None:
     passes((max(1, -(-int(number) // _THREADS)),), (_THREADS,), arguments)
 
 
-def _options(scheme: Laplacian, results: Mapping[str, Any]) -> list[Any]:
-    """Whether it is Liu's area, and the results in the order of the passes; null where nobody asks."""
+def _options(mesh: QuadMesh | QuadGrid, scheme: Laplacian, results: Mapping[str, Any]) -> list[Any]:
+    """How positions are rounded, whether it is Liu's area, and the results in the order of the passes.
+
+    Null where nobody asks.
+    """
     assert scheme.fast is not None
     order = ("mean_curvature_normal", "mean_curvature", "vertex_normals", "dual_areas")
-    return [np.int32(scheme.fast.area == "quads"), *(results.get(name, np.uintp(0)) for name in order)]
+    given = np.float64(coarse(mesh.roundoff)), np.int32(scheme.fast.area == "quads")
+    return [*given, *(results.get(name, np.uintp(0)) for name in order)]
 
 
 def _empty(shape: Any, dtype: Any = np.float64) -> Any:

@@ -145,7 +145,7 @@ def part_results(mesh: FaceParts, p: int, job: _Job, alone: bool = False) -> Ans
     if part is None:
         return owned, results, ""
     if isinstance(scheme, Laplacian):
-        found = drivers.run(part.mesh, scheme, wanted, boundary, size=mesh.largest)
+        found = drivers.run(part.mesh, scheme, wanted, boundary)
     else:
         around = fits.MeshNeighbourhoods(part.mesh, boundary)
         around.rounding = fits.ROUNDING * mesh.largest

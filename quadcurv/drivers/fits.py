@@ -275,7 +275,8 @@ def _continued(stencils: Stencils, layers: int) -> list[_Beyond]:
     border = np.flatnonzero(~stencils.closed)
     kept, faces = topology.part_around(stencils.faces, border, stencils.n, REACH)
     closed = stencils.closed[kept]
-    part = Stencils(stencils.points[kept], faces, closed.shape, closed, stencils.orientable)
+    points, orientable, roundoff = stencils.points[kept], stencils.orientable, stencils.roundoff
+    part = Stencils(points, faces, closed.shape, closed, orientable, roundoff=roundoff)
     layer = ghosts(part, _GHOST_DEGREE, layers)
     if layer.quads.size == 0:
         return []
@@ -286,7 +287,7 @@ def _continued(stencils: Stencils, layers: int) -> list[_Beyond]:
     # What is looked at with many others, by polynomials of a higher degree, must be right beyond doubt.
     share = 1.0 if layers < _GHOST_LAYERS else _SURE
     closed[unsure] = layer.error[unsure] <= share * fitted(part, unsure).error
-    ghosted = Stencils(points, faces, part.shape, closed, part.orientable)
+    ghosted = replace(part, points=points, faces=faces, closed=closed)
     near = np.arange(len(points)) >= part.n
     bad = np.zeros(len(points), bool)
     corners = np.where(faces < 0, faces[:, :1], faces)
@@ -331,7 +332,8 @@ def _stencils(mesh: Mesh) -> tuple[Stencils, Bools]:
         closed, present = np.zeros((2, mesh.mask.size), bool)
         closed[known], present[known] = stencils.closed, one_fan
         faces = known.astype(np.int32)[stencils.faces]
-        return Stencils(mesh.points.reshape(-1, 3), faces, mesh.shape, closed), present
+        points = mesh.points.reshape(-1, 3)
+        return Stencils(points, faces, mesh.shape, closed, roundoff=mesh.roundoff), present
     stencils, present = mesh.stencils(), np.ones(mesh.stencils().n, bool)
     if isinstance(mesh, QuadMesh):
         kind = mesh.connectivity.kind

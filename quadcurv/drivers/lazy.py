@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 
 from quadcurv.boundary import checked_boundary
-from quadcurv.drivers import DOUBLE
 from quadcurv.drivers.chunked import MARGIN, Region, entry, hole_refused, region, sides
 from quadcurv.drivers.tasks import Task, with_holes
 from quadcurv.drivers.windows import Cut, HoleError, Range, arrays_of, opened, taken
@@ -50,7 +49,7 @@ def _evaluate_one(grid: ChunkedGrid, task: Task, boundary: str) -> dict[str, Any
     compute = delayed(_block, pure=False)
 
     size = None
-    if task.scaled or (grid.roundoff > DOUBLE and not holes):
+    if task.scaled:
         size = da.nanmax(da.absolute(grid.points))
         if grid.dual is not None:
             size = da.maximum(size, da.absolute(grid.dual).max())

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from quadcurv.boundary import one_rings
-from quadcurv.drivers import DOUBLE, answers, apply, compiled, far_away, fits, has_holes, run
+from quadcurv.drivers import answers, apply, compiled, fits, has_holes, run
 from quadcurv.drivers.windows import Window
 from quadcurv.mesh import QuadGrid, StaggeredGrid
 from quadcurv.mesh.chunked import part
@@ -41,7 +41,7 @@ class Task:
     depth : int
         Rows along open sides whose answers rest on what is beyond the side.
     scaled : bool
-        Whether the size of the whole grid's coordinates is asked for, even in double precision.
+        Whether the size of the whole grid's coordinates is asked for.
     """
 
     shapes: dict[str, tuple[int, ...]]
@@ -63,16 +63,10 @@ def laplacian(scheme: Laplacian, wanted: Iterable[str]) -> Task:
         if scheme.fast is not None and inside:
             assert isinstance(grid, QuadGrid)
             _pass(window, grid, scheme.fast, into)
-            if grid.roundoff > DOUBLE:
-                far: Any = far_away(grid, grid.roundoff, window.size)
-                moved = {name: np.empty_like(values) for name, values in into.items() if name != "dual_areas"}
-                _pass(window._replace(grid=far), far, scheme.fast, moved)
-                for name, values in moved.items():
-                    into[name][np.isnan(values)] = np.nan
             return
         found = {}
         if _has_quads(grid):
-            found = run(grid, scheme, names, boundary or "nan", size=window.size)
+            found = run(grid, scheme, names, boundary or "nan")
         _put(window, found, into)
 
     return Task(names, 1, write, small=scheme.fast is None)

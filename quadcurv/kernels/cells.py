@@ -81,21 +81,22 @@ def diagonals(corners):
 
 
 @formula
-def first_fluxes(planes, p, q, b, part, width):
+def first_fluxes(planes, p, q, b, part, width, coarse):
     """Begin the sums of row q."""
     for i in span(FIRST, FIRST + width):
         u, v = below(planes, p, q, b, i)
         n = cross(u, v)
-        n, part[i + ROW] = unit(n, known_square(n, u, v, middle(*corners_below(planes, p, q, b, i))))
+        point = middle(*corners_below(planes, p, q, b, i))
+        n, part[i + ROW] = unit(n, known_square(n, u, v, point, coarse))
         place(part, i, Y, fluxes(u, v, n)[0])
 
 
 @formula
-def first_edge(planes, p, a, b, work):
+def first_edge(planes, p, a, b, work, coarse):
     """The edge to the left of the first point of row p."""
     u, v = beside_right(planes, p, a, b, FIRST - 1)
     n = cross(u, v)
-    square = known_square(n, u, v, middle(*corners_right(planes, p, a, b, FIRST - 1)))
+    square = known_square(n, u, v, middle(*corners_right(planes, p, a, b, FIRST - 1)), coarse)
     n, work[FIRST - 1 + LENGTH] = unit(n, square)
     place(work, FIRST - 1 + NORMAL, S, n)
 
@@ -132,15 +133,15 @@ def edge_and_ring_normals(planes, p, q, a, b, work, g, width, padded):
 
 
 @formula
-def known_squares(planes, p, q, a, b, work, g, padded):
+def known_squares(planes, p, q, a, b, work, g, padded, coarse):
     """Make squares zero that are but for rounding."""
     for k in span(0, padded, 1):
         i, j = FIRST + g + k, FIRST + k
         for plane, squares, corners in quads(p, q, a, b, i, planes):
             n = triple(work, j + plane, S)
-            work[j + squares] = known_square(n, *diagonals(corners), middle(*corners))
+            work[j + squares] = known_square(n, *diagonals(corners), middle(*corners), coarse)
         n, around = triple(work, j + RING, S), ring(planes, a, b, i)
-        work[j + SQUARE] = known_ring_square(n, around, triple(planes, p + i, Y))
+        work[j + SQUARE] = known_ring_square(n, around, triple(planes, p + i, Y), coarse)
 
 
 @formula
@@ -203,7 +204,7 @@ def cell_curvatures(planes, p, q, a, b, work, part, scale, H, g, at, width):
 
 
 @kernel
-def _pass(points, size, c, beyond, beside, dual, liu, Hn, H, normal, area, start, stop, room):
+def _pass(points, size, c, beyond, beside, dual, coarse, liu, Hn, H, normal, area, start, stop, room):
     planes, part = part_of(room, 0, 4 * ROW), part_of(room, 4 * ROW, 4 * Y)
     work = part_of(room, PLANES * Y, WORK)
     rows, around = points.size // size, beyond.size == 0
@@ -226,15 +227,16 @@ def _pass(points, size, c, beyond, beside, dual, liu, Hn, H, normal, area, start
                 at = 3 * ((c + 1) * i + begin)
                 far = load_row(planes, b + FIRST, dual, dual, True, at, width + 1, far)
             if i == start:
-                first_fluxes(planes, p, q, b, part, width)
+                first_fluxes(planes, p, q, b, part, width, coarse)
             elif i > start:
-                first_edge(planes, p, a, b, work)
+                first_edge(planes, p, a, b, work, coarse)
                 for left in range(begin, end, STRETCH):
                     right = min(left + STRETCH, end)
                     g, at, width = left - begin, (i - 1) * c + left, right - left
                     padded = (width + TOGETHER - 1) & -TOGETHER
-                    if not is_clear(edge_and_ring_normals(planes, p, q, a, b, work, g, width, padded), far):
-                        known_squares(planes, p, q, a, b, work, g, padded)
+                    least = edge_and_ring_normals(planes, p, q, a, b, work, g, width, padded)
+                    if not is_clear(least, far, coarse):
+                        known_squares(planes, p, q, a, b, work, g, padded, coarse)
                     edge_scales(work, padded)
                     if liu:
                         liu_edge_scales(work, part, g, padded)
@@ -252,7 +254,9 @@ def _pass(points, size, c, beyond, beside, dual, liu, Hn, H, normal, area, start
             p, q, a, b = q, p, b, a
 
 
-def staggered_curvatures(points, size, c, beyond, beside, dual, liu, Hn, H, normal, area, start, stop):
+def staggered_curvatures(
+    points, size, c, beyond, beside, dual, coarse, liu, Hn, H, normal, area, start, stop
+):
     """As `grid_curvatures`, of the primal points of a staggered grid.
 
     Parameters
@@ -261,7 +265,7 @@ def staggered_curvatures(points, size, c, beyond, beside, dual, liu, Hn, H, norm
         As for `grid_curvatures`, of primal points.
     dual : (3 (r + 1) (c + 1),) float64
         Dual points; those of the first row and column come before the first primal ones.
-    liu, Hn, H, normal, area, start, stop
+    coarse, liu, Hn, H, normal, area, start, stop
         As for `grid_curvatures`.
     """
-    _pass(points, size, c, beyond, beside, dual, liu, Hn, H, normal, area, start, stop, make_room())
+    _pass(points, size, c, beyond, beside, dual, coarse, liu, Hn, H, normal, area, start, stop, make_room())

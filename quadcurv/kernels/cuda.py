@@ -31,14 +31,14 @@ _FORMULAS = {
     "cross": (vector.cross, "tt"),
     "fused_cross": (vector.fused_cross, "tt"),
     "dot": (vector.dot, "tt"),
-    "known_square": (vector.known_square, "tttt"),
+    "known_square": (vector.known_square, "ttttd"),
     "unit": (vector.unit, "td"),
     "fluxes": (quad.fluxes, "ttt"),
     "ring_scale": (quad.ring_scale, "d"),
     "ring_area": (quad.ring_area, "d"),
     "quads_scale": (quad.quads_scale, "d"),
     "quads_area": (quad.quads_area, "d"),
-    "conductance": (quad.conductance, "ttt"),
+    "conductance": (quad.conductance, "tttd"),
 }
 
 

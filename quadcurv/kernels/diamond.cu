@@ -56,10 +56,10 @@ DEVICE triple grid_point(const double* RESTRICT p, long long i, long long j, lon
 // What a quad gives to its vertices: its first one is a, then b, c, d around it.
 struct quad_part { triple first, second; double length; };
 
-DEVICE quad_part quad_of(triple a, triple b, triple c, triple d) {
+DEVICE quad_part quad_of(triple a, triple b, triple c, triple d, double coarse) {
   quad_part q;
   triple u = less(c, a), v = less(d, b), n = cross(u, v), m;
-  unit(n, known_square(n, u, v, a), m, q.length);
+  unit(n, known_square(n, u, v, a, coarse), m, q.length);
   fluxes(u, v, m, q.first, q.second);
   return q;
 }
@@ -67,7 +67,8 @@ DEVICE quad_part quad_of(triple a, triple b, triple c, triple d) {
 // A thread goes down WIDE columns, HIGH rows of them, and keeps the sums of the row above: a quad serves four vertices, of which those
 // in columns of other threads compute it again.
 GLOBAL void grid_curvatures(const double* RESTRICT p, long long rows, long long columns, int wrap_rows,
-                            int wrap_columns, int liu, double* Hn, double* H, double* normal, double* area) {
+                            int wrap_columns, double coarse, int liu, double* Hn, double* H, double* normal,
+                            double* area) {
   results out = {Hn, H, normal, area};
   long long across = (columns + WIDE * blockDim.x - 1) / (WIDE * blockDim.x);
   long long j = WIDE * (blockIdx.x % across * blockDim.x + threadIdx.x), begin = blockIdx.x / across * HIGH;
@@ -82,9 +83,9 @@ GLOBAL void grid_curvatures(const double* RESTRICT p, long long rows, long long 
     above[k] = grid_point(p, begin - 1, column, rows, columns, wrap_rows, wrap_columns);
     here[k] = grid_point(p, begin, column, rows, columns, wrap_rows, wrap_columns);
   }
-  quad_part left = quad_of(above[0], here[0], here[1], above[1]);
+  quad_part left = quad_of(above[0], here[0], here[1], above[1], coarse);
   for (int k = 0; k < WIDE; k++) {
-    quad_part right = quad_of(above[k + 1], here[k + 1], here[k + 2], above[k + 2]);
+    quad_part right = quad_of(above[k + 1], here[k + 1], here[k + 2], above[k + 2], coarse);
     part[k] = less(right.second, left.first);
     both[k] = right.length + left.length;
     left = right;
@@ -94,16 +95,16 @@ GLOBAL void grid_curvatures(const double* RESTRICT p, long long rows, long long 
       long long column = j + k - 1 <= columns ? j + k - 1 : columns;
       below[k] = grid_point(p, i + 1, column, rows, columns, wrap_rows, wrap_columns);
     }
-    left = quad_of(here[0], below[0], below[1], here[1]);
+    left = quad_of(here[0], below[0], below[1], here[1], coarse);
     for (int k = 0; k < WIDE; k++) {
-      quad_part right = quad_of(here[k + 1], below[k + 1], below[k + 2], here[k + 2]);
+      quad_part right = quad_of(here[k + 1], below[k + 1], below[k + 2], here[k + 2], coarse);
       triple flux = plus(part[k], less(right.first, left.second));
       double lengths = right.length + left.length, sum = both[k] + lengths;
       both[k] = lengths;
       part[k] = less(right.second, left.first);
       left = right;
       triple a = less(below[k + 1], above[k + 1]), b = less(here[k + 2], here[k]), ring = cross(a, b);
-      double square = known_square(ring, a, b, here[k + 1]);
+      double square = known_square(ring, a, b, here[k + 1], coarse);
       if (j + k < columns) finish(out, i * columns + j + k, flux, ring, square, sum, liu);
     }
     for (int k = 0; k < WIDE + 2; k++) { above[k] = here[k]; here[k] = below[k]; }
@@ -111,8 +112,8 @@ GLOBAL void grid_curvatures(const double* RESTRICT p, long long rows, long long 
 }
 
 // Regular vertices of a face list from rings (n, 8); others are left alone.
-GLOBAL void ring_curvatures(const double* RESTRICT p, const int* RESTRICT ring, long long n, int liu, double* Hn,
-                            double* H, double* normal, double* area) {
+GLOBAL void ring_curvatures(const double* RESTRICT p, const int* RESTRICT ring, long long n, double coarse, int liu,
+                            double* Hn, double* H, double* normal, double* area) {
   long long v = blockIdx.x * (long long)blockDim.x + threadIdx.x;
   if (v >= n || ring[8 * v] < 0) return;
   triple c = load(p, v), edge[4], diagonal[4], flux[4];
@@ -123,18 +124,19 @@ GLOBAL void ring_curvatures(const double* RESTRICT p, const int* RESTRICT ring, 
   }
   for (int k = 0; k < 4; k++) {
     triple u = less(diagonal[k], c), w = less(edge[(k + 1) % 4], edge[k]), m = cross(u, w), normal_of_quad;
-    unit(m, known_square(m, u, w, c), normal_of_quad, length[k]);
+    unit(m, known_square(m, u, w, c, coarse), normal_of_quad, length[k]);
     flux[k] = fused_cross(w, normal_of_quad);
   }
   triple a = less(edge[2], edge[0]), b = less(edge[3], edge[1]), m = cross(a, b);
   triple sum = plus(plus(flux[0], flux[1]), plus(flux[2], flux[3]));
   results out = {Hn, H, normal, area};
-  finish(out, v, sum, m, known_square(m, a, b, c), (length[0] + length[1]) + (length[2] + length[3]), liu);
+  double square = known_square(m, a, b, c, coarse);
+  finish(out, v, sum, m, square, (length[0] + length[1]) + (length[2] + length[3]), liu);
 }
 
 // Rows of the stiffness matrix in CSR, nine entries each in the order of their columns, of regular vertices.
 GLOBAL void ring_stiffness(const double* RESTRICT p, const int* RESTRICT ring, const int* RESTRICT indptr,
-                           long long n, int* indices, double* data) {
+                           long long n, double coarse, int* indices, double* data) {
   long long v = blockIdx.x * (long long)blockDim.x + threadIdx.x;
   if (v >= n || ring[8 * v] < 0) return;
   triple c = load(p, v), edge[4], diagonal[4];
@@ -147,7 +149,9 @@ GLOBAL void ring_stiffness(const double* RESTRICT p, const int* RESTRICT ring, c
     edge[k] = load(p, column[2 * k + 1]);
     diagonal[k] = load(p, column[2 * k + 2]);
   }
-  for (int k = 0; k < 4; k++) conductance(less(diagonal[k], c), less(edge[(k + 1) % 4], edge[k]), c, own[k], mixed[k]);
+  for (int k = 0; k < 4; k++) {
+    conductance(less(diagonal[k], c), less(edge[(k + 1) % 4], edge[k]), c, coarse, own[k], mixed[k]);
+  }
   weight[0] = (own[0] + own[1]) + (own[2] + own[3]);
   for (int k = 0; k < 4; k++) {
     weight[2 * k + 1] = mixed[k] - mixed[(k + 3) % 4];

@@ -67,8 +67,8 @@ def quads_area(lengths):
     return 0.125 * lengths
 
 
-def conductance(u, v, point):
+def conductance(u, v, point, coarse):
     """K_00 and K_01 of a quad: K (u, v) are the half fluxes into its first two vertices."""
     n = cross(u, v)
-    scale = 0.5 * unless_zero(reciprocal_root(dot(n, n)), known_square(n, u, v, point))
+    scale = 0.5 * unless_zero(reciprocal_root(dot(n, n)), known_square(n, u, v, point, coarse))
     return scale * dot(v, v), -scale * dot(u, v)

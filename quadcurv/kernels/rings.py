@@ -64,7 +64,7 @@ def ask_ring(points, ring, v):
 
 
 @formula
-def corner_normals(x, work):
+def corner_normals(x, work, coarse):
     """Normals (d - c) x (b - a) of the corners of every vertex c of a block."""
     for k in span(0, BLOCK):
         c = triple(x, k, BLOCK)
@@ -75,7 +75,8 @@ def corner_normals(x, work):
             n, i = cross(u, v), corner * BLOCK + k
             place(work, i, CORNERS, n)
             d = triple(x, edge(corner) + POINT + k, BLOCK)
-            work[SQUARE + i] = known_square(n, u, v, middle(c, d, around[corner], around[corner - 3]))
+            point = middle(c, d, around[corner], around[corner - 3])
+            work[SQUARE + i] = known_square(n, u, v, point, coarse)
 
 
 @formula
@@ -88,13 +89,13 @@ def corner_units(work):
 
 
 @formula
-def ring_normals(x, work):
+def ring_normals(x, work, coarse):
     """Unit normals of rings, and the finite-volume scheme's scales and areas."""
     for k in span(0, BLOCK, 2):
         u, v = apart(x, edge(2) + k, x, edge(0) + k, BLOCK), apart(x, edge(3) + k, x, edge(1) + k, BLOCK)
         n = cross(u, v)
         around = [triple(x, edge(corner) + k, BLOCK) for corner in range(4)]
-        square = known_ring_square(n, around, triple(x, k, BLOCK))
+        square = known_ring_square(n, around, triple(x, k, BLOCK), coarse)
         work[SCALE + k] = scale = ring_scale(square)
         work[AREA + k] = ring_area(square)
         place(work, RING + k, BLOCK, times(n, scale))
@@ -152,7 +153,7 @@ def dual_areas(work, area, at, size):
 
 
 @kernel
-def _pass(points, ring, far, liu, Hn, H, normal, area, start, stop, x, work):
+def _pass(points, ring, far, coarse, liu, Hn, H, normal, area, start, stop, x, work):
     vectors, numbers, normals, areas = Hn.size > 0, H.size > 0, normal.size > 0, area.size > 0
     for at in range(start, stop, BLOCK):
         size = min(BLOCK, stop - at)
@@ -160,10 +161,10 @@ def _pass(points, ring, far, liu, Hn, H, normal, area, start, stop, x, work):
             if far and at + k + AHEAD < stop:
                 ask_ring(points, ring, at + k + AHEAD)
             gather_ring(points, ring, at + k, x, k)
-        corner_normals(x, work)
+        corner_normals(x, work, coarse)
         corner_units(work)
         if not liu or numbers or normals:
-            ring_normals(x, work)
+            ring_normals(x, work, coarse)
         if liu:
             liu_scales(work)
         if vectors:
@@ -176,7 +177,7 @@ def _pass(points, ring, far, liu, Hn, H, normal, area, start, stop, x, work):
             dual_areas(work, area, at, size)
 
 
-def ring_curvatures(points, ring, far, liu, Hn, H, normal, area, start, stop):
+def ring_curvatures(points, ring, far, coarse, liu, Hn, H, normal, area, start, stop):
     """As `grid_curvatures`, of the regular vertices start..stop of a face list.
 
     Parameters
@@ -187,21 +188,21 @@ def ring_curvatures(points, ring, far, liu, Hn, H, normal, area, start, stop):
         regular, whose results are NaN.
     far : bool
         Whether neighbours are far apart in `points`.
-    liu, Hn, H, normal, area, start, stop
+    coarse, liu, Hn, H, normal, area, start, stop
         As for `grid_curvatures`.
     """
-    _pass(
-        points, ring, far, liu, Hn, H, normal, area, start, stop, np.zeros(27 * BLOCK), np.zeros(25 * BLOCK)
-    )
+    x, work = np.zeros(27 * BLOCK), np.zeros(25 * BLOCK)
+    _pass(points, ring, far, coarse, liu, Hn, H, normal, area, start, stop, x, work)
 
 
 @formula
-def corner_weights(x, work, corner, a, b):
+def corner_weights(x, work, corner, a, b, coarse):
     """`conductance` of one corner of every vertex of a block."""
     for k in span(0, BLOCK):
         corners = [triple(x, i + k, BLOCK) for i in (0, a + POINT, a, b)]
         u, v = less(corners[1], corners[0]), less(corners[3], corners[2])
-        work[OWN + corner * BLOCK + k], work[MIXED + corner * BLOCK + k] = conductance(u, v, middle(*corners))
+        own, mixed = conductance(u, v, middle(*corners), coarse)
+        work[OWN + corner * BLOCK + k], work[MIXED + corner * BLOCK + k] = own, mixed
 
 
 @formula
@@ -244,7 +245,7 @@ def store_row(work, column, rank, first, indices, data, k):
 
 
 @kernel
-def _rows(points, ring, indptr, indices, data, start, stop, x, work, column, rank):
+def _rows(points, ring, coarse, indptr, indices, data, start, stop, x, work, column, rank):
     for at in range(start, stop, BLOCK):
         size = min(BLOCK, stop - at)
         for k in range(size):
@@ -252,7 +253,7 @@ def _rows(points, ring, indptr, indices, data, start, stop, x, work, column, ran
             gather_columns(ring, at + k, column, k)
         for corner in range(4):
             a, b = (2 * corner + 1) * POINT, ((2 * corner + 2) % 8 + 1) * POINT
-            corner_weights(x, work, corner, a, b)
+            corner_weights(x, work, corner, a, b, coarse)
         stiffness_rows(work)
         ranks(column, rank)
         for k in range(size):
@@ -260,12 +261,12 @@ def _rows(points, ring, indptr, indices, data, start, stop, x, work, column, ran
                 store_row(work, column, rank, indptr[at + k], indices, data, k)
 
 
-def ring_stiffness(points, ring, indptr, indices, data, start, stop):
+def ring_stiffness(points, ring, coarse, indptr, indices, data, start, stop):
     """Rows start..stop of the stiffness in CSR, columns sorted, of regular vertices; others are left alone.
 
     Parameters
     ----------
-    points, ring
+    points, ring, coarse
         As for `ring_curvatures`.
     indptr : (n + 1,) int32
         Nine entries a row.
@@ -274,16 +275,5 @@ def ring_stiffness(points, ring, indptr, indices, data, start, stop):
     start, stop : int
     """
     column, rank = np.zeros((2, 9 * BLOCK), np.int32)
-    _rows(
-        points,
-        ring,
-        indptr,
-        indices,
-        data,
-        start,
-        stop,
-        np.zeros(27 * BLOCK),
-        np.zeros(17 * BLOCK),
-        column,
-        rank,
-    )
+    x, work = np.zeros(27 * BLOCK), np.zeros(17 * BLOCK)
+    _rows(points, ring, coarse, indptr, indices, data, start, stop, x, work, column, rank)

@@ -132,11 +132,11 @@ def ring_diagonals(planes, o, p, q, i):
 
 
 @formula
-def first_quad(planes, p, q, work):
+def first_quad(planes, p, q, work, coarse):
     """The quad before the first one of a row."""
     u, v = diagonals(planes, p, q, FIRST - 1)
     n = cross(u, v)
-    square = known_square(n, u, v, quad_middle(planes, p, q, FIRST - 1))
+    square = known_square(n, u, v, quad_middle(planes, p, q, FIRST - 1), coarse)
     n, work[FIRST - 1 + LENGTH] = unit(n, square)
     place(work, FIRST - 1 + NORMAL, S, n)
 
@@ -193,21 +193,21 @@ def quad_and_ring_normals(planes, o, p, q, work, g, width, padded):
 
 
 @formula
-def is_clear(least, far):
+def is_clear(least, far, coarse):
     """Whether all squares are larger than what rounding could make of zero, be it the most that there is."""
-    return from_bits(least) > most_rounding(from_bits(far))
+    return from_bits(least) > most_rounding(from_bits(far), coarse)
 
 
 @formula
-def known_squares(planes, o, p, q, work, g, padded, rings):
+def known_squares(planes, o, p, q, work, g, padded, rings, coarse):
     """Make squares zero that are but for rounding, those of the rings too if they are there."""
     for k in span(0, padded, 1):
         i, j = FIRST + g + k, FIRST + k
         normal, u, v = (triple(work, j + plane, S) for plane in (NORMAL, U, V))
-        work[j + QUAD_SQUARE] = known_square(normal, u, v, quad_middle(planes, p, q, i))
+        work[j + QUAD_SQUARE] = known_square(normal, u, v, quad_middle(planes, p, q, i), coarse)
         n = cross(*ring_diagonals(planes, o, p, q, i))
         around = [triple(planes, k, Y) for k in (o + i, p + i - 1, q + i, p + i + 1)]
-        square = known_ring_square(n, around, triple(planes, p + i, Y))
+        square = known_ring_square(n, around, triple(planes, p + i, Y), coarse)
         work[j + SQUARE] = where(rings, square, work[j + SQUARE])
 
 
@@ -317,7 +317,7 @@ def ask_to_write(values, begin):
 
 
 @kernel
-def _pass(points, size, c, beyond, beside, liu, Hn, H, normal, area, start, stop, room):
+def _pass(points, size, c, beyond, beside, coarse, liu, Hn, H, normal, area, start, stop, room):
     # An array of size 0 is a result that nobody wants.
     planes, part = part_of(room, 0, 4 * ROW), part_of(room, 4 * ROW, 4 * Y)
     work = part_of(room, PLANES * Y, WORK)
@@ -343,7 +343,7 @@ def _pass(points, size, c, beyond, beside, liu, Hn, H, normal, area, start, stop
                     # As the work on this stretch goes on, the next one arrives, a third at a time; all of it
                     # at once would have to be waited for.
                     if left == begin:
-                        first_quad(planes, p, q, work)
+                        first_quad(planes, p, q, work, coarse)
                     ask(points, first + 3 * right)
                     if vectors:
                         ask_to_write(Hn, 3 * (at + width))
@@ -360,8 +360,8 @@ def _pass(points, size, c, beyond, beside, liu, Hn, H, normal, area, start, stop
                         least = quad_and_ring_normals(planes, o, p, q, work, g, width, padded)
                     else:
                         least = quad_normals_ring_squares(planes, o, p, q, work, g, width, padded)
-                    if not is_clear(least, far):
-                        known_squares(planes, o, p, q, work, g, padded, rings)
+                    if not is_clear(least, far, coarse):
+                        known_squares(planes, o, p, q, work, g, padded, rings, coarse)
                     ask(points, first + 3 * right + STRETCH)
                     if vectors:
                         ask_to_write(Hn, 3 * (at + width) + STRETCH)
@@ -398,7 +398,7 @@ def _pass(points, size, c, beyond, beside, liu, Hn, H, normal, area, start, stop
             o, p, q, fresh = p, q, fresh, o
 
 
-def grid_curvatures(points, size, c, beyond, beside, liu, Hn, H, normal, area, start, stop):
+def grid_curvatures(points, size, c, beyond, beside, coarse, liu, Hn, H, normal, area, start, stop):
     """Mean curvature normal, mean curvature, unit normal and dual area of the vertices of rows start..stop.
 
     Parameters
@@ -411,6 +411,8 @@ def grid_curvatures(points, size, c, beyond, beside, liu, Hn, H, normal, area, s
     beside : (6 (r + 2),) float64
         The columns before the first one and after the last one, those of the rows of `beyond` too. Of size 0
         where rows are closed.
+    coarse : float
+        See `vector.rounding`.
     liu : bool
         Dual areas of Liu's formula, not those of the finite-volume scheme.
     Hn, normal : (3 r c,) float64
@@ -419,4 +421,4 @@ def grid_curvatures(points, size, c, beyond, beside, liu, Hn, H, normal, area, s
         As these.
     start, stop : int
     """
-    _pass(points, size, c, beyond, beside, liu, Hn, H, normal, area, start, stop, make_room())
+    _pass(points, size, c, beyond, beside, coarse, liu, Hn, H, normal, area, start, stop, make_room())

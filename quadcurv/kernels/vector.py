@@ -79,17 +79,18 @@ def dot(a, b):
 def rounding(edges, far):
     """Square of a cross product up to which it is zero but for the rounding of its factors and of points.
 
-    `edges` is the sum of the squares of the factors, `far` that of the coordinates of a point beside them.
+    `edges` is the sum of the squares of the factors, `far` that of the coordinates of a point beside them,
+    times `coarse` everywhere: the square of how much coarser positions are rounded than doubles.
     """
     return ROUNDING * edges * (edges + far)
 
 
-def most_rounding(far):
+def most_rounding(far, coarse):
     """`rounding` of whatever factors and points, `far` being the largest square of any point's coordinates.
 
     A difference of two points has at most four times it, the eight of a ring at most 32 times.
     """
-    return rounding(32.1 * far, far)
+    return rounding(32.1 * far, coarse * far)
 
 
 def middle(a, b, c, d):
@@ -97,20 +98,21 @@ def middle(a, b, c, d):
     return times(plus(plus(a, b), plus(c, d)), 0.25)
 
 
-def known_square(n, u, v, point):
+def known_square(n, u, v, point, coarse):
     """Square of n = u x v of a quad about a point, zero where n is but for rounding."""
     square = dot(n, n)
-    return where(square > rounding(dot(u, u) + dot(v, v), dot(point, point)), square, 0.0)
+    return where(square > rounding(dot(u, u) + dot(v, v), coarse * dot(point, point)), square, 0.0)
 
 
-def known_ring_square(n, around, c):
+def known_ring_square(n, around, c, coarse):
     """Square of n, the sum of the cross products of neighbours around c, zero where n is but for rounding.
 
     Each neighbour is a factor of two of these products.
     """
-    square, edges = dot(n, n), [less(a, c) for a in around]
-    one, two, three, four = [dot(edge, edge) for edge in edges]
-    return where(square > rounding(2.0 * ((one + two) + (three + four)), dot(c, c)), square, 0.0)
+    square, spokes = dot(n, n), [less(a, c) for a in around]
+    one, two, three, four = [dot(spoke, spoke) for spoke in spokes]
+    edges = 2.0 * ((one + two) + (three + four))
+    return where(square > rounding(edges, coarse * dot(c, c)), square, 0.0)
 
 
 def quotient(x, y):

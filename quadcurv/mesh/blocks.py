@@ -229,7 +229,7 @@ class GridBlocks:
             beside = np.stack((index[:-2, 1:-1], index[2:, 1:-1], index[1:-1, :-2], index[1:-1, 2:]))
             closed[self.numbers[block]] = (beside >= 0).all(axis=0)
         points = np.concatenate((self.points, duals))
-        return Stencils(points, np.concatenate(faces), self.shape, closed)
+        return Stencils(points, np.concatenate(faces), self.shape, closed, roundoff=self.roundoff)
 
     def faces(self, block: int) -> Ints:
         """(m, 4) int32: the quads of a block of vertices, by the numbers of these."""

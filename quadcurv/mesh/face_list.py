@@ -148,7 +148,9 @@ class QuadMesh:
     def stencils(self) -> Stencils:
         """One-ring stencils of the vertices as they are; rings at a boundary stay open."""
         c = self.connectivity
-        stencils = Stencils(self.points, c.faces, (len(self.points),), c.closed, c.orientable, c.polygons)
+        stencils = Stencils(
+            self.points, c.faces, (len(self.points),), c.closed, c.orientable, c.polygons, self.roundoff
+        )
         stencils.__dict__.update(ring=c.ring, irregular=c.irregular)
         return stencils
 
@@ -162,9 +164,8 @@ class QuadMesh:
         if c.irregular.size == 0:
             return c.irregular, Stencils(self.points[:0], self.faces[:0], (0,), np.empty(0, bool))
         vertices, faces = c.irregular_part
-        part = Stencils(
-            self.points[vertices], faces, (vertices.size,), c.closed[vertices], orientable=c.orientable
-        )
+        points, closed = self.points[vertices], c.closed[vertices]
+        part = Stencils(points, faces, vertices.shape, closed, c.orientable, roundoff=self.roundoff)
         return c.irregular, part
 
     def with_points(self, points: ArrayLike) -> QuadMesh:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from copy import copy
 from dataclasses import dataclass
 from typing import Any
 
@@ -119,7 +120,8 @@ class QuadGrid:
             closed[[0, -1]] = False
         if not self.wrap[1]:
             closed[:, [0, -1]] = False
-        return Stencils(self.points.reshape(-1, 3), grid_faces(index), self.shape, closed.ravel())
+        points, faces = self.points.reshape(-1, 3), grid_faces(index)
+        return Stencils(points, faces, self.shape, closed.ravel(), roundoff=self.roundoff)
 
     def in_shape(self, values: NDArray[Any]) -> NDArray[Any]:
         """Return values (n, ...) of the vertices that :meth:`stencils` has, in the shape of results.
@@ -147,7 +149,14 @@ class QuadGrid:
         """Return the two rows (axis 0) or columns (1) at the first (end 0) or last (-1) open side."""
         size = self.shape[axis]
         kept = range(2) if end == 0 else range(size - 2, size)
-        return QuadGrid(self.points.take(kept, axis), [w and i != axis for i, w in enumerate(self.wrap)])
+        wrap = [w and i != axis for i, w in enumerate(self.wrap)]
+        return QuadGrid(self.points.take(kept, axis), wrap).with_roundoff(self.roundoff)
+
+    def with_roundoff(self, roundoff: float) -> QuadGrid:
+        """Return the same grid whose positions were given in another precision."""
+        grid = copy(self)
+        grid.__dict__.update(roundoff=roundoff)
+        return grid
 
     def to_mesh(self) -> QuadMesh:
         """Return the same quads as a face list, vertices in row-major order, masked ones left out."""

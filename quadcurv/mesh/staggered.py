@@ -114,7 +114,9 @@ class StaggeredGrid:
         kept = range(min(2, size)) if end == 0 else range(max(0, size - 2), size)
         corners = range(kept.start, kept.stop + 1)
         wrap = [w and i != axis for i, w in enumerate(self.wrap)]
-        return StaggeredGrid(self.primal.take(kept, axis), self.dual.take(corners, axis), wrap)
+        side = StaggeredGrid(self.primal.take(kept, axis), self.dual.take(corners, axis), wrap)
+        side.__dict__.update(roundoff=self.roundoff)
+        return side
 
     @property
     def has_ghosts(self) -> bool:
@@ -198,4 +200,5 @@ class StaggeredGrid:
             np.ascontiguousarray(faces[(faces >= 0).all(axis=1)]),
             self.shape,
             (around >= 0).all(axis=0).ravel(),
+            roundoff=self.roundoff,
         )

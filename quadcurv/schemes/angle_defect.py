@@ -36,7 +36,7 @@ def angle_defect(stencils: Stencils) -> tuple[Floats, Floats]:
     angle = np.arctan2(sine, np.einsum("tsx,tsx->ts", a, b))
     # A triangle without area has angles all the same, but for those beside an edge without length.
     aa, bb, far = (np.einsum("tsx,tsx->ts", x, x) for x in (a, b, corner))
-    angle[np.minimum(aa, bb) <= vector.ROUNDING * far] = np.nan
+    angle[np.minimum(aa, bb) <= vector.ROUNDING * stencils.coarse * far] = np.nan
     size = len(stencils.points)
     turn, area = np.zeros((2, size))
     np.add.at(turn, triangles, angle)

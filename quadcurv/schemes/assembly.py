@@ -7,11 +7,15 @@ from collections.abc import Callable, Iterable, Iterator
 import numpy as np
 import scipy
 
+from quadcurv.schemes.triangles import squared_distance
 from quadcurv.stencils import Stencils
 from quadcurv.types import Floats, Ints
 
-Local = Callable[[Floats], tuple[Floats, Floats]]
-"""Corners (m, k, 3) of faces of k sides -> their matrices (m, k, k) and parts of the dual areas (m, k)."""
+Local = Callable[[Floats, Floats], tuple[Floats, Floats]]
+"""Corners (m, k, 3) of faces of k sides -> their matrices (m, k, k) and parts of the dual areas (m, k).
+
+The second argument (m,) tells how their corners are rounded: `far` of `triangles.length`.
+"""
 
 MOST_SIDES = 128  # of a polygon kept as one: its matrix is full
 _ENTRIES = 1 << 15  # of the matrices that are there at a time
@@ -25,16 +29,16 @@ def from_faces(
     Parameters
     ----------
     local : callable
-        Corners (m, k, 3) of faces of k sides -> (matrices (m, k, k), parts of the dual areas (m, k)), the
-        first positive semi-definite; NaN for a face without area. Called once for k = 3, once for k = 4,
-        a part of the mesh at a time.
+        A `Local`: corners (m, k, 3) of faces of k sides and how these are rounded -> (matrices (m, k, k),
+        parts of the dual areas (m, k)), the first positive semi-definite; NaN for a face without area.
+        Called once for k = 3, once for k = 4, a part of the mesh at a time.
     polygons : bool
         Whether faces of more than four sides, up to ``MOST_SIDES``, are given to `local` too, instead of
         the triangles that they are cut into.
     """
 
     def assemble(stencils: Stencils) -> tuple[scipy.sparse.csr_array, Floats]:
-        return assembled(stencils.points, list(_by_sides(stencils, polygons)), local, stencils.n)
+        return assembled(stencils, list(_by_sides(stencils, polygons)), local, stencils.n)
 
     return assemble
 
@@ -46,7 +50,7 @@ def flux_from_faces(local: Local, polygons: bool = False) -> Callable[[Stencils]
         from quadcurv.kernels import assembly
 
         sums, areas = np.zeros((stencils.n, 3)), np.zeros(len(stencils.points))
-        for faces, matrices, parts in _pieces(stencils.points, _by_sides(stencils, polygons), local):
+        for faces, matrices, parts in _pieces(stencils, _by_sides(stencils, polygons), local):
             assembly.add_fluxes(matrices, stencils.points, faces, sums)
             np.add.at(areas, faces, parts)
         return sums, areas[: stencils.n]
@@ -72,11 +76,12 @@ def ring_areas(stencils: Stencils) -> Floats:
 
 
 def assembled(
-    points: Floats, groups: list[Ints], local: Local, n: int
+    stencils: Stencils, groups: list[Ints], local: Local, n: int
 ) -> tuple[scipy.sparse.csr_array, Floats]:
     """Rows 0..n of the sum of the matrices of faces (m, k), and dual areas (n,)."""
     from quadcurv.kernels import assembly
 
+    points = stencils.points
     sides = np.concatenate([np.full(len(faces), faces.shape[1]) for faces in groups])
     first = np.concatenate(([0], np.cumsum(sides)))
     corners = np.concatenate([faces.ravel() for faces in groups])
@@ -86,7 +91,7 @@ def assembled(
     else:
         indices = indices.astype(np.int64)
     data, areas = np.zeros(indices.size), np.zeros(len(points))
-    for faces, matrices, parts in _pieces(points, groups, local):
+    for faces, matrices, parts in _pieces(stencils, groups, local):
         assembly.add(matrices, faces, indptr, indices, data)
         np.add.at(areas, faces, parts)
     return scipy.sparse.csr_array((data, indices, indptr), (n, len(points))), areas[:n]
@@ -114,12 +119,15 @@ def _by_sides(stencils: Stencils, polygons: bool) -> Iterator[Ints]:
     yield from larger
 
 
-def _pieces(points: Floats, groups: Iterable[Ints], local: Local) -> Iterator[tuple[Ints, Floats, Floats]]:
+def _pieces(
+    stencils: Stencils, groups: Iterable[Ints], local: Local
+) -> Iterator[tuple[Ints, Floats, Floats]]:
     """Some faces at a time, with their matrices and areas: memory does not grow with the mesh."""
     for faces in groups:
         step = max(1, _ENTRIES // faces.shape[1] ** 2)
         for begin in range(0, len(faces), step):
             part = faces[begin : begin + step]
+            x = stencils.points[part]
             with np.errstate(all="ignore"):  # faces without area
-                matrices, parts = local(points[part])
+                matrices, parts = local(x, stencils.coarse * squared_distance(x))
             yield part, np.ascontiguousarray(matrices), parts

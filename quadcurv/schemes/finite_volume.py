@@ -60,19 +60,19 @@ def _flux(stencils: Stencils) -> tuple[Floats, Floats]:
     from quadcurv.kernels import faces
 
     flux, unused = np.zeros_like(stencils.points), np.zeros(len(stencils.points))
-    faces.quad_fluxes(stencils.points, stencils.faces, flux, unused)
+    faces.quad_fluxes(stencils.points, stencils.faces, flux, unused, stencils.coarse)
     if stencils.has_triangles:
         corners, _, points = _flap_points(stencils)
-        faces.flap_fluxes(points, corners, stencils.points[0], flux)
+        faces.flap_fluxes(points, corners, stencils.points[0], flux, stencils.coarse)
     return flux[: stencils.n], _dual_areas(stencils)
 
 
 def _assemble(stencils: Stencils) -> tuple[scipy.sparse.csr_array, Floats]:
     n, p = stencils.n, len(stencils.points)
-    S, _ = assembled(stencils.points, [stencils.faces[stencils.faces[:, 3] >= 0]], diamond, n)
+    S, _ = assembled(stencils, [stencils.faces[stencils.faces[:, 3] >= 0]], diamond, n)
     if stencils.has_triangles:
         corners, place, points = _flap_points(stencils)
-        far = squared_distance(stencils.points[corners[:, :1]])
+        far = stencils.coarse * squared_distance(stencils.points[corners[:, :1]])
         row = diamond(points[corners], far)[0][:, 0]
         where = np.repeat(corners[:, 0], 4), corners.ravel()
         flaps = scipy.sparse.csr_array((row.ravel(), where), (p, len(points)))[:n]

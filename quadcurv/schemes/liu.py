@@ -12,17 +12,17 @@ from quadcurv.stencils import Stencils
 from quadcurv.types import Floats
 
 
-def _local(x: Floats) -> tuple[Floats, Floats]:
-    return linear(x) if x.shape[1] == 3 else diamond(x)
+def _local(x: Floats, far: Floats) -> tuple[Floats, Floats]:
+    return linear(x, far) if x.shape[1] == 3 else diamond(x, far)
 
 
 def _flux(stencils: Stencils) -> tuple[Floats, Floats]:
     from quadcurv.kernels import faces
 
     flux, area = np.zeros_like(stencils.points), np.zeros(len(stencils.points))
-    faces.quad_fluxes(stencils.points, stencils.faces, flux, area)
+    faces.quad_fluxes(stencils.points, stencils.faces, flux, area, stencils.coarse)
     if stencils.has_triangles:
-        faces.triangle_fluxes(stencils.points, stencils.faces, flux, area)
+        faces.triangle_fluxes(stencils.points, stencils.faces, flux, area, stencils.coarse)
     return flux[: stencils.n], area[: stencils.n]
 
 

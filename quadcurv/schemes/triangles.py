@@ -23,9 +23,9 @@ EDGES = np.array(
 )
 
 
-def linear(x: Floats) -> tuple[Floats, Floats]:
+def linear(x: Floats, far: Floats) -> tuple[Floats, Floats]:
     """Cotan matrices (m, 3, 3) of triangles (m, 3, 3), and a third of their areas at each corner (m, 3)."""
-    weights, double = half_cotans(x.transpose(1, 2, 0), squared_distance(x))
+    weights, double = half_cotans(x.transpose(1, 2, 0), far)
     return np.tensordot(weights, EDGES, ((0,), (0,))), thirds(weights, double).T
 
 
@@ -34,12 +34,14 @@ def thirds(weights: Floats, double: Floats) -> Floats:
     return np.broadcast_to(double / 6, weights.shape)
 
 
-def cut_up(x: Floats, areas: Callable[[Floats, Floats], Floats] = thirds) -> tuple[Floats, Floats]:
+def cut_up(
+    x: Floats, far: Floats, areas: Callable[[Floats, Floats], Floats] = thirds
+) -> tuple[Floats, Floats]:
     """As `linear`, of polygons (m, k, 3) that are cut into triangles, `areas` giving the parts of each."""
     m, k, _ = x.shape
     triangles, polygon = cut(x.reshape(-1, 3), np.arange(0, m * k + 1, k), np.arange(m * k, dtype=np.int32))
     corners = x.reshape(-1, 3)[triangles].transpose(1, 2, 0)
-    weights, double = half_cotans(corners, squared_distance(x)[polygon])
+    weights, double = half_cotans(corners, far[polygon])
     matrices, parts, slots = np.zeros((m, k, k)), np.zeros((m, k)), triangles % k
     where = polygon[:, None, None], slots[:, :, None], slots[:, None]
     np.add.at(matrices, where, np.tensordot(weights, EDGES, ((0,), (0,))))
@@ -50,7 +52,7 @@ def cut_up(x: Floats, areas: Callable[[Floats, Floats], Floats] = thirds) -> tup
 def half_cotans(corners: Iterable[Floats], far: Floats) -> tuple[Floats, Floats]:
     """Halves of the cotans (3, ...) at corners of triangles, and twice their areas (...), NaN without area.
 
-    Each of the three corners is (3, ...), `far` the squared distance from the origin of what they belong to.
+    Each of the three corners is (3, ...); `far` as in `length`, of what they belong to.
     """
     a, b, c = corners
     across_a, across_b, across_c = c - b, a - c, b - a
@@ -84,7 +86,8 @@ def squared_distance(x: Floats) -> Floats:
 def length(product: Floats, edges: Floats, far: Floats) -> Floats:
     """Length (...) of cross products (3, ...), NaN where these are zero but for rounding.
 
-    `edges` is the sum of the squares of the factors, `far` the squared distance from the origin.
+    `edges` is the sum of the squares of the factors, `far` the squared distance from the origin, times
+    `Stencils.coarse`.
     """
     from quadcurv.kernels import vector
 
