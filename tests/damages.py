@@ -164,7 +164,7 @@ def single_precision_far_away(s, rng):
     """A mesh in single precision away from the origin; two rows at sides magnify its rounding as noise."""
     offset = 10.0 ** rng.uniform(0, 6)
     damaged = single_precision(s, rng)
-    damaged.explained *= (1 + offset / np.abs(s.points).max()) * np.where(border(s, 2), 10, 1)
+    damaged.explained *= (1 + offset / np.abs(s.points).max()) * np.where(border(s, 2), 25, 1)
     damaged.points = s.points + offset
     return damaged
 

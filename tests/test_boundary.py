@@ -439,7 +439,7 @@ def test_fitted_surfaces_are_weighted_least_squares(rng):
     for k, v in enumerate(vertices):
         for i, (degree, rings) in enumerate(kinds):
             near, T = around[k][(ring[k] > 0) & (ring[k] <= rings)], (degree + 1) * (degree + 2) // 2 - 1
-            if near.size <= T:
+            if near.size < T + surfaces.SPARE:
                 assert np.isnan(found[k, i]).all()
                 continue
             x = given.points[near] - given.points[v]

@@ -192,7 +192,7 @@ def _error(terms: Floats, ghosts: Floats, ends: _Ends, degree: int) -> tuple[Flo
     smooth &= number > (LEAST if degree < 5 else LEAST + 1)
     # Along the surface an error does harm by as much as the surface turns from point to point.
     square = _around(along + turn**2 * all_, beside)
-    calm = _around(along, beside) < _CALM * _around(_dot(before, normal) ** 2, beside)
+    calm = (number > LEAST) & (_around(along, beside) < _CALM * _around(_dot(before, normal) ** 2, beside))
     square = np.where(calm & (degree < 5), _FAITHFUL, 1.0) * square
     if degree > 4:
         doubt = (

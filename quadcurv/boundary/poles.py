@@ -78,6 +78,7 @@ def poles_of_faces(stencils: Stencils, roundoff: float) -> Indices | None:
     if stencils.polygons is not None or stencils.closed.all():
         return None
     border = np.append(~stencils.closed, np.zeros(len(points) - n + 1, bool))
+    faces = faces[np.count_nonzero(border[faces], axis=1) > 1]
     following = np.roll(faces, -1, axis=1)
     following = np.where(following < 0, faces[:, :1], following)
     row, slot = np.nonzero(border[faces] & border[following] & (faces >= 0))

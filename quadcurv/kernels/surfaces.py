@@ -20,6 +20,7 @@ THIN = 1e-8  # of a neighbourhood's spread: no more than a line
 CONDITION = 1e5
 SPREAD = 1.3  # radius at which weights vanish, of the neighbourhood's
 STEEP = 0.45  # cosine between normals; where it is less, polynomials of several rings do not follow
+SPARE = 2  # points more than terms; with fewer residuals are small by chance
 TALL = 4  # columns that are done at once
 COLUMNS = len(TERMS) + TALL  # of the terms of a point
 TINY = 2.0**-1022
@@ -270,7 +271,7 @@ def _fits(
             lane[WIDTH * FIRST + k] = first
             for i in range(fits):
                 size, degree = counts[WIDTH * i + k], degrees[i]
-                good = size > (degree + 1) * (degree + 2) // 2 and (degree <= 2 or steep >= size)
+                good = size >= (degree + 1) * (degree + 2) // 2 + SPARE and (degree <= 2 or steep >= size)
                 if not good or frames[frame + 6] - frames[frame + 6] != 0:
                     counts[WIDTH * i + k] = 0
         most = 0
