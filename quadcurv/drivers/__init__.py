@@ -13,7 +13,7 @@ from quadcurv.drivers import blocks, compiled, device, direct, fits
 from quadcurv.drivers.answers import shapes
 from quadcurv.drivers.averages import averaged, checked_radius
 from quadcurv.drivers.fits import each
-from quadcurv.drivers.targets import checked_out
+from quadcurv.drivers.targets import IN_MEMORY, checked_out, targets
 from quadcurv.mesh import GridBlocks, Mesh, QuadGrid, QuadMesh, StaggeredGrid
 from quadcurv.schemes import Curvatures, Fit, Laplacian, Scheme
 from quadcurv.stencils import Stencils
@@ -120,23 +120,5 @@ def arrays(
     if isinstance(mesh, GridBlocks) and out:
         raise ValueError("out: blocks have an array each, which are new ones")
     shape = (len(mesh.points),) if isinstance(mesh, QuadMesh) else mesh.shape
-    results: dict[str, Floats] = {}
-    for name, one in shapes(scheme, (*wanted, *out)).items():
-        full = shape + one
-        if name not in out:
-            results[name] = np.empty(full)
-            continue
-        array = out[name]
-        if (
-            type(array) is not np.ndarray
-            or array.shape != full
-            or array.dtype != np.float64
-            or not (array.flags.c_contiguous and array.flags.writeable)
-        ):
-            raise ValueError(f"out: {name} wants a writeable C-contiguous float64 ndarray of shape {full}")
-        given = {} if isinstance(mesh, GridBlocks) else mesh.arrays()
-        for other, taken in (*given.items(), *results.items()):
-            if np.may_share_memory(array, taken):
-                raise ValueError(f"out: {name} overlaps the memory of {other}")
-        results[name] = array
-    return results
+    full = {name: shape + one for name, one in shapes(scheme, (*wanted, *out)).items()}
+    return targets(full, out, {} if isinstance(mesh, GridBlocks) else mesh.arrays(), IN_MEMORY)

@@ -18,7 +18,7 @@ import numpy as np
 from quadcurv.boundary import checked_boundary
 from quadcurv.drivers import answers
 from quadcurv.drivers.progress import tracked
-from quadcurv.drivers.targets import checked_out, targets
+from quadcurv.drivers.targets import IN_SLICES, checked_out, targets
 from quadcurv.drivers.tasks import BORDER, Task, with_holes
 from quadcurv.drivers.windows import (
     Cut,
@@ -107,7 +107,9 @@ def evaluate(
     checked_boundary(boundary)
     lead = tuple(int(n) for n in grid.points.shape[:-3])
     shapes = {name: lead + grid.shape + more for name, more in task.shapes.items()}
-    results = targets(shapes, checked_out(out), (grid.points, grid.dual, grid.mask, *task.others))
+    sources = {"points": grid.points, "dual": grid.dual, "mask": grid.mask}
+    sources |= {f"function {k}": f for k, f in enumerate(task.others)}
+    results = targets(shapes, checked_out(out), sources, IN_SLICES)
     for at in np.ndindex(*lead):
         own = {name: _entry(array, at) for name, array in results.items()}
         one = entry(grid, at)

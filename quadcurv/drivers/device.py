@@ -15,6 +15,7 @@ import numpy as np
 from quadcurv.boundary import REACH, checked_boundary, closed, poles
 from quadcurv.device_arrays import as_cupy, is_on_device, on_host, taken
 from quadcurv.drivers import answers, compiled, direct
+from quadcurv.drivers.targets import Kind, targets
 from quadcurv.mesh import QuadGrid, QuadMesh
 from quadcurv.schemes import Fit, Laplacian, Scheme
 from quadcurv.stencils import Stencils, coarse
@@ -58,7 +59,9 @@ def evaluate(
     checked_boundary(boundary)
     checked_scheme(scheme)
     assert scheme.fast is not None
-    results = _arrays(mesh, scheme, wanted, {} if out is None else out)
+    given, shape = {} if out is None else out, evaluate_shape(mesh)
+    full = {name: shape + one for name, one in answers.shapes(scheme, (*wanted, *given)).items()}
+    results = targets(full, given, {"points": mesh.points}, _KIND)
     if isinstance(mesh, QuadMesh):
         _evaluate_faces(mesh, scheme, boundary, results)
     else:
@@ -208,23 +211,19 @@ def _empty(shape: Any, dtype: Any = np.float64) -> Any:
     return cupy.empty(shape, dtype)
 
 
-def _arrays(
-    mesh: QuadMesh | QuadGrid, scheme: Laplacian, wanted: Iterable[str], out: Mapping[str, Any]
-) -> dict[str, Any]:
-    """The caller's arrays, or new ones, as `drivers` has them."""
+def _on_device(array: Any, shape: tuple[int, ...]) -> Any:
+    """What passes write to without looking again."""
+    if not is_on_device(array):
+        return None
+    given = as_cupy(array)
+    fits = given.shape == shape and given.dtype == np.float64 and given.flags.c_contiguous
+    return given if fits else None
+
+
+def _share(one: Any, other: Any) -> bool:
     import cupy
 
-    shape, results = evaluate_shape(mesh), {}
-    for name, one in answers.shapes(scheme, (*wanted, *out)).items():
-        full = shape + one
-        if name not in out:
-            results[name] = _empty(full)
-            continue
-        array = as_cupy(out[name]) if is_on_device(out[name]) else None
-        if array is None or array.shape != full or array.dtype != np.float64 or not array.flags.c_contiguous:
-            raise ValueError(f"out: {name} wants a C-contiguous float64 array of shape {full} on the device")
-        for other, there in (("points", mesh.points), *results.items()):
-            if cupy.may_share_memory(array, there):
-                raise ValueError(f"out: {name} overlaps the memory of {other}")
-        results[name] = array
-    return results
+    return bool(cupy.may_share_memory(one, other))
+
+
+_KIND = Kind("a C-contiguous float64 array of shape {} on the device", _empty, _on_device, _share)

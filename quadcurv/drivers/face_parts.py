@@ -12,7 +12,7 @@ from quadcurv.boundary import REACH, checked_boundary
 from quadcurv.checks import Finding
 from quadcurv.drivers import answers, fits
 from quadcurv.drivers.progress import tracked
-from quadcurv.drivers.targets import checked_out, targets
+from quadcurv.drivers.targets import IN_SLICES, checked_out, targets
 from quadcurv.mesh import part_sides
 from quadcurv.mesh.face_parts import FaceParts
 from quadcurv.mesh.mapped import forget
@@ -41,7 +41,8 @@ def evaluate(
     checked_boundary(boundary)
     given = checked_out(out)
     shapes = answers.shapes(scheme, (*wanted, *given))
-    results = targets({name: mesh.shape + one for name, one in shapes.items()}, given, (mesh.points,))
+    full = {name: mesh.shape + one for name, one in shapes.items()}
+    results = targets(full, given, {"points": mesh.points}, IN_SLICES)
     try:
         said = _by_parts(mesh, scheme, boundary, results, progress)
     except part_sides.SidesError:

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import mmap
 import os
-from collections.abc import Iterable, Mapping
-from typing import Any
+from collections.abc import Callable, Mapping
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -17,38 +17,77 @@ def checked_out(out: Mapping[str, Any] | None) -> Mapping[str, Any]:
     return {} if out is None else out
 
 
+class Kind(NamedTuple):
+    """Arrays of one kind, that a driver writes results to.
+
+    Attributes
+    ----------
+    wanted : str
+        What they are, for who gives others; {} for their shape.
+    new : callable
+        Shape -> array.
+    taken : callable
+        (array, shape) -> the caller's array as the driver takes it, None if it does not.
+    share : callable
+        (array, array) -> whether they have memory, or a place in a file, in common.
+    """
+
+    wanted: str
+    new: Callable[[tuple[int, ...]], Any]
+    taken: Callable[[Any, tuple[int, ...]], Any]
+    share: Callable[[Any, Any], bool]
+
+
 def targets(
-    shapes: Mapping[str, tuple[int, ...]], out: Mapping[str, Any], sources: Iterable[Any]
+    shapes: Mapping[str, tuple[int, ...]], out: Mapping[str, Any], sources: Mapping[str, Any], kind: Kind
 ) -> dict[str, Any]:
-    """Arrays of some shapes by name, those of `out` or new ones, that share nothing with what is read."""
-    results: dict[str, Any] = {}
-    for name, shape in shapes.items():
-        if name in out:
-            results[name] = checked_target(out[name], name, shape, (*sources, *results.values()))
-        else:
-            results[name] = np.empty(shape)
-    return results
-
-
-def checked_target(array: Any, name: str, shape: tuple[int, ...], sources: Iterable[Any]) -> Any:
-    """An array of `out` that takes results of a shape, whatever their precision.
+    """Arrays of some shapes by name, those of `out` or new ones, that share nothing with what is read.
 
     Raises
     ------
     ValueError
-        It does not, or it shares memory, or a place in a file, with what is read or with another result.
+        One of `out` is of another kind, or shares memory, or a place in a file, with what is read or with
+        another result.
     """
+    results: dict[str, Any] = {}
+    for name, shape in shapes.items():
+        if name not in out:
+            results[name] = kind.new(shape)
+            continue
+        array = kind.taken(out[name], shape)
+        if array is None:
+            raise ValueError(f"out: {name} wants {kind.wanted.format(shape)}, got {_said(out[name])}")
+        for other, there in (*sources.items(), *results.items()):
+            if kind.share(array, there):
+                raise ValueError(f"out: {name} overlaps the memory of {other}")
+        results[name] = array
+    return results
+
+
+def _said(array: Any) -> str:
+    """What an array is, for who gave it."""
+    kind = "array that is read-only" if _is_read_only(array) else type(array).__name__
+    dtype = getattr(array, "dtype", np.dtype(object))
+    return f"{dtype} of shape {tuple(getattr(array, 'shape', ()))} ({kind})"
+
+
+def _as_ndarray(array: Any, shape: tuple[int, ...]) -> Any:
+    """What kernels write to without looking again."""
+    fits = (
+        type(array) is np.ndarray
+        and array.shape == shape
+        and array.dtype == np.float64
+        and array.flags.c_contiguous
+        and array.flags.writeable
+    )
+    return array if fits else None
+
+
+def _in_slices(array: Any, shape: tuple[int, ...]) -> Any:
+    """What takes results block by block, whatever their precision."""
     writeable = hasattr(array, "__setitem__") and not _is_read_only(array)
     given, dtype = tuple(getattr(array, "shape", ())), np.dtype(getattr(array, "dtype", object))
-    if not writeable or given != shape or dtype.kind != "f":
-        kind = "array that is read-only" if _is_read_only(array) else type(array).__name__
-        raise ValueError(
-            f"out: {name} wants an array of floats of shape {shape} that can be written to, got {dtype} of "
-            f"shape {given} ({kind})"
-        )
-    if any(_share(array, other) for other in sources):
-        raise ValueError(f"out: {name} overlaps the memory of the grid or of another result")
-    return array
+    return array if writeable and given == shape and dtype.kind == "f" else None
 
 
 def _is_read_only(array: Any) -> bool:
@@ -90,3 +129,9 @@ def _place(array: Any) -> tuple[Any, int, int]:
     first = array.offset // mmap.ALLOCATIONGRANULARITY * mmap.ALLOCATIONGRANULARITY - mapped
     low, high = np.lib.array_utils.byte_bounds(array)
     return array.filename, first + low, first + high
+
+
+IN_MEMORY = Kind(
+    "a writeable C-contiguous float64 ndarray of shape {}", np.empty, _as_ndarray, np.may_share_memory
+)
+IN_SLICES = Kind("an array of floats of shape {} that can be written to", np.empty, _in_slices, _share)
