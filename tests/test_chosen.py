@@ -19,15 +19,15 @@ from quadcurv.schemes import jet
 # ---- convergence ---------------------------------------------------------------------------------------
 
 SMOOTH = [
-    ("elliptic_paraboloid", "grid", (32, 64, 128), 5.7, 1.3e-7),
+    ("elliptic_paraboloid", "grid", (32, 64, 128), 4.9, 1.3e-7),
     ("tanh_sheet", "grid", (32, 64, 128), 5.5, 1.2e-7),
     ("enneper", "grid", (32, 64, 128), 5.7, 2.5e-8),
     ("hyperboloid", "grid", (32, 64, 128), 4.6, 6e-7),
     ("catenoid", "grid", (32, 64, 128), 4.6, 1e-6),
     ("torus", "grid", (32, 64, 128), 4.7, 2.8e-6),
-    ("dupin_cyclide", "grid", (32, 64, 128), 4.6, 5.5e-5),
+    ("dupin_cyclide", "grid", (32, 64, 128), 4.1, 4.5e-5),
     ("ellipsoid", "grid", (32, 64, 128), 5.8, 5e-7),
-    ("cubed_ellipsoid", "faces", (16, 32, 64), 5.6, 1.4e-7),
+    ("cubed_ellipsoid", "faces", (16, 32, 64), 5.3, 1.4e-7),
 ]
 
 
@@ -46,9 +46,9 @@ def test_order_on_smooth_meshes(name, layout, sizes, rate, bound):
     ("name", "layout", "sizes", "rate", "bound"),
     [
         ("elliptic_paraboloid", "grid", (32, 64, 128), 4.2, 2e-6),
-        ("tanh_sheet", "grid", (32, 64, 128), 4.2, 1.5e-5),
+        ("tanh_sheet", "grid", (32, 64, 128), 4.1, 8e-6),
         ("enneper", "grid", (32, 64, 128), 3.8, 8e-5),
-        ("hyperboloid", "grid", (32, 64, 128), 3.4, 1e-4),
+        ("hyperboloid", "grid", (32, 64, 128), 2.8, 3e-5),
         ("torus", "grid", (32, 64, 128), 4.2, 1e-5),
         ("dupin_cyclide", "grid", (32, 64, 128), 4.1, 1.4e-4),
         ("cubed_ellipsoid", "faces", (16, 32, 64), 4.8, 1e-6),
@@ -62,6 +62,22 @@ def test_order_under_jitter(name, layout, sizes, rate, bound):
         errors.append(np.abs(qc.mean_curvature(mesh) - exact).max())
     assert errors[-1] < bound
     assert fitted_rate(sizes, errors) > rate
+
+
+@pytest.mark.parametrize(
+    ("case", "H", "K"),
+    [
+        (cases.on(cases.STAR, cases.catmull_clark(cases.dodecahedron(), 4)), 4e-4, 1.5e-3),
+        (cases.patch(34, 0.2, 11), 7e-6, 7e-6),
+        (cases.cyclide(48, 48), 3e-4, 6e-4),
+    ],
+    ids=["star", "patch", "cyclide"],
+)
+def test_spheres_are_left_where_planes_do_better(case, H, K):
+    """Of saddles, dents and graphs spheres make terms of higher degree: errors were two to five times these."""
+    found = qc.curvatures(case.mesh)
+    assert np.abs(found.mean - case.H).mean() < H
+    assert np.abs(found.gaussian - case.K).mean() < K
 
 
 @pytest.mark.parametrize("jitter", [0.0, 0.2])
@@ -228,7 +244,7 @@ def test_intervals_cover_on_humps(noise):
     [
         (cases.on(cases.ellipsoid(), cases.cubed(16)), 3.5),
         (cases.ellipsoid().jittered(cases.cubed(16), 0.2), 3.0),
-        (cases.cyclide(48, 48), 2.5),
+        (cases.cyclide(48, 48), 3.0),
         (cases.ring().jittered(cases.ring_grid(60, 36).mesh, 0.15, 7), 4.5),
     ],
     ids=["ellipsoid", "jitter", "cyclide", "torus"],

@@ -95,7 +95,7 @@ class MeshNeighbourhoods:
         for faces, place, reach, error in (*(self._beyond(rings) if ghosts else ()), *self._at_poles(rings)):
             at = np.where(self._at_crease[vertices], -1, place[vertices]) if one_sided else place[vertices]
             if error is not None:  # one-sided fits follow a smooth surface as well, but magnify noise
-                if kind == jet.SMOOTH:
+                if kind in (jet.SMOOTH, jet.FLAT):
                     continue  # which the scheme looks at itself
                 own_error = out[:, jet.SIGMA] * out[:, jet.GAIN]
                 at = np.where(own_error <= _CLEARLY * error[at], -1, at)

@@ -9,9 +9,10 @@ first, so that what the curvature needs (c10, c01, c20, c11, c02) comes last: th
 Cholesky factor gives it without the others. The very last term is the constant one: less its row
 the factor is that of fits through the vertex.
 
-Three KINDS of fits: PLAIN ones; ROUND ones, over the sphere instead of the plane (see `moments`); SMOOTH
+Four KINDS of fits: PLAIN ones; ROUND ones, over the sphere instead of the plane (see `moments`); SMOOTH
 ones, round, through the vertex, and with weights (1 - r^2)^4 that fall to nearly nothing at the rim (Jiao and
-Zha 2008 interpolate and weigh): of these bias is least, of the others noise. They are of even degree.
+Zha 2008 interpolate and weigh): of these bias is least, of the others noise; FLAT ones, like the SMOOTH but
+over the plane. All but the first are of even degree.
 
 WIDTH fits, a block, go through every step together, in registers side by side.
 """
@@ -60,7 +61,7 @@ from quadcurv.kernels.moments import (
 )
 from quadcurv.kernels.shape import INDICES, curvatures, variances
 
-PLAIN, ROUND, SMOOTH = KINDS = range(3)
+PLAIN, ROUND, SMOOTH, FLAT = KINDS = range(4)
 # Below this part of a term's square nothing is left but rounding.
 PIVOT = 1e-9
 # Columns of a result.
@@ -149,18 +150,19 @@ def _fit(
     stop, P, lane, px, q, mu, A, diagonal, G, results, table, starts,
 ):  # fmt: skip
     n, szz = out.size // (nested * COLUMNS), mu.size // WIDTH - 1
+    is_round, through = (kind == ROUND) | (kind == SMOOTH), kind >= SMOOTH
     for block in range(blocks):
         first, size = block * room, 0
         for k in range(block * WIDTH, (block + 1) * WIDTH):
             size = max(size, counts[k])
         frames(points, normals, centres, counts, block, lane)
         if beside[block]:
-            into_frames_beside(points, index, first, size, kind != PLAIN, P, lane)
+            into_frames_beside(points, index, first, size, is_round, P, lane)
             into_planes_beside(normals, index, first, size, kind == ROUND, P, lane)
         else:
-            into_frames(points, index, first, size, kind != PLAIN, P, lane)
+            into_frames(points, index, first, size, is_round, P, lane)
             into_planes(normals, index, first, size, kind == ROUND, P, lane)
-        into_maps(P, size, kind == SMOOTH, lane)
+        into_maps(P, size, through, lane)
         clear(mu, szz + 1)
         for begin in range(0, size, CHUNK):
             some = min(CHUNK, size - begin)
@@ -176,7 +178,7 @@ def _fit(
             if d >= 0:
                 factor(A, diagonal, mu, table, starts[d // 2], T, lane)
             if k < nested:
-                if kind == SMOOTH:  # of least squares without weights the factor tells all
+                if through:  # of least squares without weights the factor tells all
                     last_rows(A, G, T)
                     if degree > 4:
                         spread_6(P, size, G, lane)
@@ -184,7 +186,7 @@ def _fit(
                         spread_4(P, size, G, lane)
                     else:
                         spread_2(P, size, G, lane)
-                result(A, lane, mu, szz, T, kind == SMOOTH, is_seen, k * COLUMNS, at, stop, out, n, results)
+                result(A, lane, mu, szz, T, through, is_seen, k * COLUMNS, at, stop, out, n, results)
                 rest(results, k * COLUMNS, at, stop, out, n)
         at += WIDTH
 
@@ -223,8 +225,8 @@ def grid_fits(points, normals, wrap, vertices, degree, rings, kind, out, start, 
         One of KINDS.
     out : (COLUMNS, k), (2 COLUMNS, k) or (3 COLUMNS, k) float64
         Columns from `start` to `stop` are filled, further rows by the same fits of two and of four degrees
-        less, at least 2, which need no moments of their own; not of SMOOTH ones. With several rings all is
-        NaN, the CONDITION too, where the neighbourhood is too steep; with any, all but the CONDITION,
+        less, at least 2, which need no moments of their own; not of SMOOTH and FLAT ones. With several rings
+        all is NaN, the CONDITION too, where the neighbourhood is too steep; with any, all but the CONDITION,
         infinite then, where it does not determine the polynomial.
     """
 

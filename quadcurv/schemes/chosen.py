@@ -2,9 +2,9 @@
 
 Where a neighbourhood resolves the surface, terms of higher degree explain nearly all that those of lower
 degree leave, and what is left says how far the fit is off: there a fit of degree 6 over three rings, through
-the vertex and with weights that fall with the distance, has the least error. Where they explain no more than
-chance does, the rest is noise: there plain least squares over as many points as the bias permits are best.
-Which of the two it is, an F test tells at every vertex.
+the vertex and with weights that fall with the distance, has the least error, over the nearest sphere or over
+the plane. Where they explain no more than chance does, the rest is noise: there plain least squares over as
+many points as the bias permits are best. Which of the two it is, an F test tells at every vertex.
 """
 
 from __future__ import annotations
@@ -37,6 +37,8 @@ _DIGITS = 2.0**-46
 # Times what noise explains with as many terms, from which on terms are the surface's, and from which on noise
 # is so little that no fit over more rings is better.
 _RESOLVED, _CLEARLY = 5.0, 15.0
+_WORTH = 2.0  # the same, from which on other fits are tried
+_LESS = 0.7  # of what one fit leaves, as much as another must: what noise leaves is no choice
 # Where noise prevails of which nobody near knows how large it is.
 _MORE = ((4, 3), (4, 4), (4, 5), (2, 3), (2, 4))
 _QUANTILE = 0.975
@@ -188,7 +190,7 @@ def chosen(around: Neighbourhoods) -> Curvatures:
     vertices = np.flatnonzero(around.wanted & ~feature)
     if vertices.size == 0:
         return found.curvatures(around.on_crease)
-    fits = around.polynomials(vertices, 6, 3, kind=kernel.SMOOTH)
+    fits = _smooth(around, vertices, 6, 3)
     good = (fits[:, kernel.CONDITION] <= _CONDITION[6]) & np.isnan(around.border_error(3)[vertices])
     unresolved = good & ~_resolved(fits, 6, around.rounding)
     hardly = good & ~unresolved & ~_resolved(fits, 6, around.rounding, _CLEARLY)
@@ -210,6 +212,23 @@ def chosen(around: Neighbourhoods) -> Curvatures:
     return found.curvatures(around.on_crease)
 
 
+def _smooth(around: Neighbourhoods, vertices: Indices, d: int, r: int, ghosts: bool = True) -> Floats:
+    """Fits through the vertex over the nearest sphere, or over the plane where these leave less.
+
+    Spheres make short work of what is round, and of what is not they make terms of higher degree. With terms
+    of the highest degrees and without: along straight lines of a mesh these go through all of a few rows.
+    """
+    from quadcurv.kernels import jet as kernel
+
+    fits = around.polynomials(vertices, d, r, ghosts, kernel.SMOOTH)
+    at = np.flatnonzero(~(_explained(fits, d) < _WORTH) & ~_exact(fits, around.rounding))
+    flat = around.polynomials(vertices[at], d, r, ghosts, kernel.FLAT)
+    left, before = (x[:, [kernel.SQUARE, kernel.LOWER]] for x in (flat, fits[at]))
+    better = (np.isfinite(left) & ~(left >= _LESS * before)).all(axis=1)
+    fits[at[better]] = flat[better]
+    return fits
+
+
 def _doubted(around: Neighbourhoods, vertices: Indices, found: _Found) -> None:
     """Take smaller neighbourhoods where those of three rings are off and these are not, as far as they tell.
 
@@ -221,7 +240,7 @@ def _doubted(around: Neighbourhoods, vertices: Indices, found: _Found) -> None:
     for d, r in _SMALLER:
         if vertices.size == 0:
             return
-        fits, other = around.polynomials(vertices, d, r, kind=kernel.SMOOTH), _Found(around)
+        fits, other = _smooth(around, vertices, d, r), _Found(around)
         other.put(vertices, fits, d, r)
         better = other.errors(vertices)[:, 0] < found.errors(vertices)[:, 0]
         better &= fits[:, kernel.CONDITION] <= _CONDITION[d]
@@ -288,7 +307,7 @@ def _at_sides(
     n = around.wanted.size
     fits, beyond, errors, (noisy, told) = [], [], [], np.zeros((2, vertices.size), bool)
     for d, r, ghosts in _SIDES:
-        here = first if (d, r) == (6, 3) else around.polynomials(vertices, d, r, ghosts, kernel.SMOOTH)
+        here = first if (d, r) == (6, 3) else _smooth(around, vertices, d, r, ghosts)
         good = (here[:, kernel.CONDITION] <= _ONE_SIDED[d, r]) & (here[:, kernel.FREEDOM] > _FREE)
         if ghosts:  # points beyond a border are never too steep: look at those that are there
             there = around.polynomials(vertices, 2, r, False, kernel.SMOOTH)
@@ -352,13 +371,25 @@ def _spheres(around: Neighbourhoods, vertices: Indices, found: _Found) -> None:
 
 def _resolved(fits: Floats, d: int, rounding: float, times: float = _RESOLVED) -> Bools:
     """Whether terms of the two highest degrees explain more than noise would, or the rest is rounding."""
+    return _exact(fits, rounding) | (_explained(fits, d) > times)
+
+
+def _explained(fits: Floats, d: int) -> Floats:
+    """What the terms of the two highest degrees explain, as multiples of what they would of noise."""
     from quadcurv.kernels import jet as kernel
 
-    terms, freedom = 2 * d + 1, fits[:, kernel.FREEDOM]
-    explained = (fits[:, kernel.LOWER] - fits[:, kernel.SQUARE]) * np.maximum(freedom, 1.0)
-    exact = fits[:, kernel.SQUARE] <= rounding**2 * np.maximum(freedom, 1.0)
-    exact |= fits[:, kernel.SQUARE] <= _DIGITS * fits[:, kernel.WHOLE]
-    return exact | (explained > times * terms * fits[:, kernel.SQUARE])
+    explained = (fits[:, kernel.LOWER] - fits[:, kernel.SQUARE]) * np.maximum(fits[:, kernel.FREEDOM], 1.0)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return explained / ((2 * d + 1) * fits[:, kernel.SQUARE])
+
+
+def _exact(fits: Floats, rounding: float) -> Bools:
+    """Whether what is left is rounding."""
+    from quadcurv.kernels import jet as kernel
+
+    square = fits[:, kernel.SQUARE]
+    exact = square <= rounding**2 * np.maximum(fits[:, kernel.FREEDOM], 1.0)
+    return exact | (square <= _DIGITS * fits[:, kernel.WHOLE])
 
 
 def _average(around: Neighbourhoods, noisy: Bools, hardly: Bools, found: _Found) -> Bools:
