@@ -145,12 +145,9 @@ NOISE = (1e-4, 1e-3, 1e-2, 5e-2, 0.1, 0.3)
 
 
 def error_bars(found: qc.Curvatures, name: str) -> Array | None:
-    """Half the width of the 95 % interval, by 1.96 standard errors where a scheme gives these alone."""
+    """Half the width of the 95 % interval, where a scheme gives one: standard errors know of noise alone."""
     interval = getattr(found, "interval", None)
-    if interval is not None:
-        return np.asarray(getattr(interval, name))
-    errors = found.standard_error
-    return None if errors is None else 1.96 * np.asarray(getattr(errors, name))
+    return None if interval is None else np.asarray(getattr(interval, name))
 
 
 def coverage(schemes: Sequence[str]) -> Iterator[tuple[str, str, float, str, float, float]]:

@@ -74,7 +74,7 @@ def test_order_under_jitter(name, layout, sizes, rate, bound):
     ids=["star", "patch", "cyclide"],
 )
 def test_spheres_are_left_where_planes_do_better(case, H, K):
-    """Of saddles, dents and graphs spheres make terms of higher degree: errors were two to five times these."""
+    """On saddles, dents and graphs spheres make terms of higher degree: errors were 2 to 5 times as large."""
     found = qc.curvatures(case.mesh)
     assert np.abs(found.mean - case.H).mean() < H
     assert np.abs(found.gaussian - case.K).mean() < K

@@ -121,8 +121,8 @@ class Curvatures:
     interval : StandardErrors or None
         Half widths of intervals about H, K, k1 and k2 that hold the exact values in 95 % of cases: the noise
         by Student's t, and twice the bias as far as the fit knows of it. Residuals count as noise as far as
-        they also move the fitted surface off its vertices; without noise widths are some 2 to 5 times the
-        error, on tori 10. Of "jet" alone.
+        they also move the fitted surface off its vertices; without noise widths are some 2 to 5 times what
+        errors ask for. Of "jet" alone.
     noise : float64 or None
         Standard deviation of the positions along the normal, from the residuals, in length.
     degree, rings : int32 or None
