@@ -67,7 +67,7 @@ def least_risks(
     from quadcurv.kernels import jet as kernel
 
     following, least = np.full(vertices.size, min(_FOLLOWING)), np.full(vertices.size, np.inf)
-    noise2, values, gains2 = np.empty(0), *np.full((2, vertices.size, 4), np.nan)
+    noise2, values, made2 = np.empty(0), *np.full((2, vertices.size, 4), np.nan)
     for r, (even, lower) in _FOLLOWING.items():
         at = np.flatnonzero(following == r)
         if at.size == 0:
@@ -84,18 +84,19 @@ def least_risks(
         chosen = best, np.arange(at.size)
         most2 = np.stack([c.most2 for c in candidates])[chosen]
         # What the difference to the fit before has beyond noise is bias (Hausman 1978).
-        new, gain2 = fits[..., :4][chosen], fits[..., kernel.GAIN : kernel.GAIN + 4][chosen] ** 2
-        beyond = (new - values[at]) ** 2 - np.maximum(gains2[at] - gain2, 0.0) * noise2[at, None]
+        new, gain = fits[..., :4][chosen], fits[..., kernel.GAIN : kernel.GAIN + 4][chosen]
+        made = (gain * np.sqrt(noise2[at, None])) ** 2  # by noise; squares of gains alone may overflow
+        beyond = (new - values[at]) ** 2 - np.maximum(made2[at] - made, 0.0)
         better = risk < least[at]
         beyond = spread(around, vertices[at], np.where(better[:, None], beyond, np.nan), _POOL)
-        bias2 = np.fmax(most2[:, None] * gain2 / gain2[:, :1] * _CAUTION**2, _BEYOND * beyond)
+        bias2 = np.fmax(most2[:, None] * (_CAUTION * gain / gain[:, :1]) ** 2, _BEYOND * beyond)
         bias = np.sqrt(np.fmax(bias2, 0.0))
         for k, c in enumerate(candidates):
             now = (best == k) & better
             yield vertices[at[now]], c.fits[now], c.degree, r, noise2[at[now]], bias[now]
         on = (risk < _WORSE * least[at]) | np.isinf(least[at])
         least[at] = np.minimum(risk, least[at])
-        values[at[better]], gains2[at[better]] = new[better], gain2[better]
+        values[at[better]], made2[at[better]] = new[better], made[better]
         following[at] = np.where(on, np.where(best > 0, lower, even), 0)
 
 
@@ -129,7 +130,8 @@ def _candidates(
         # Where the fit before is hardly determined its own bias is that of what this one does not look at.
         share = np.minimum(1.0, (gain2 + most) / before.gain2)
         seen = excess * less + np.nan_to_num(share * before.bias2)
-        most = np.maximum(per_term - noise2, 0.0) * less + np.nan_to_num(before.most2 * gain2 / before.gain2)
+        left = before.most2 * (gain2 / before.gain2)
+        most = np.maximum(per_term - noise2, 0.0) * less + np.nan_to_num(left)
         before = Candidate(lower, degree, seen, most, noise2)
         yield before
 
