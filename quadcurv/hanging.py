@@ -58,32 +58,42 @@ def _hanging(polygons: Faces, given: GivenFaces, points: Floats) -> Bools:
     of_one = np.bincount(corners, minlength=n) + np.bincount(given.table[given.table >= 0], minlength=n) == 1
     alone = of_one[corners]
     found = np.zeros(corners.size, bool)
-    if not alone.any():
-        return found
-    joined = _edges(polygons, given, n)
-    begins = polygons.begins
-    owner = np.repeat(np.arange(len(polygons)), polygons.sizes)
-    for f in np.unique(owner[alone]).tolist():
-        size = int(polygons.sizes[f])
-        at = begins[f] + np.arange(size)
+    # Few lie between the corners before and after them: others need not be looked at.
+    place = np.flatnonzero(alone)
+    owner = np.searchsorted(polygons.ends, place, side="right")
+    begin, size = polygons.begins[owner], polygons.sizes[owner]
+    before, after = (points[corners[begin + (place - begin + k) % size]] for k in (-1, 1))
+    straight = _straight(points[corners[place]] - before, after - before)
+    runs, keys = [], []
+    for f in np.unique(owner[straight]).tolist():
+        m = int(polygons.sizes[f])
+        at = polygons.begins[f] + np.arange(m)
         kept = np.flatnonzero(~alone[at])
         for i, j in zip(kept, np.roll(kept, -1), strict=True):  # runs of such corners between two others
-            run = at[(i + 1 + np.arange((j - i - 1) % size)) % size]
+            run = at[(i + 1 + np.arange((j - i - 1) % m)) % m]
             a, b = corners[at[i]], corners[at[j]]
-            if run.size and a != b and min(a, b) * n + max(a, b) in joined:
-                found[run] = _between(points[corners[run]] - points[a], points[b] - points[a])
+            if run.size and a != b and _between(points[corners[run]] - points[a], points[b] - points[a]):
+                runs.append(run)
+                keys.append(min(a, b) * n + max(a, b))
+    if runs:
+        for run, joined in zip(runs, np.isin(keys, _edges(polygons, given, n)), strict=True):
+            found[run] = joined
     return found
+
+
+def _straight(x: Floats, edge: Floats) -> Bools:
+    """Whether points (k, 3) lie on edges (k, 3)."""
+    apart = np.cross(x, edge)
+    return np.asarray((apart * apart).sum(axis=-1) <= (_STRAIGHT * (edge * edge).sum(axis=-1)) ** 2)
 
 
 def _between(x: Floats, edge: Floats) -> bool:
     """Whether points lie on an edge, one after the other."""
-    square = edge @ edge
-    along = np.concatenate(([0.0], x @ edge, [square]))
-    apart = np.cross(x, edge)
-    return bool((np.diff(along) > 0).all() and (apart * apart).sum(axis=1).max() <= (_STRAIGHT * square) ** 2)
+    along = np.concatenate(([0.0], x @ edge, [edge @ edge]))
+    return bool((np.diff(along) > 0).all() and _straight(x, np.broadcast_to(edge, x.shape)).all())
 
 
-def _edges(polygons: Faces, given: GivenFaces, n: int) -> set[int]:
+def _edges(polygons: Faces, given: GivenFaces, n: int) -> Indices:
     """Pairs of vertices that an edge joins, as numbers."""
     table = given.table.astype(np.int64)
     following = np.where(np.roll(table, -1, axis=1) < 0, table[:, :1], np.roll(table, -1, axis=1))
@@ -92,5 +102,4 @@ def _edges(polygons: Faces, given: GivenFaces, n: int) -> set[int]:
     after[polygons.ends - 1] = polygons.begins
     a = np.concatenate((table[there], polygons.corners))
     b = np.concatenate((following[there], polygons.corners[after]))
-    keys: Indices = np.minimum(a, b) * n + np.maximum(a, b)
-    return set(keys.tolist())
+    return np.asarray(np.minimum(a, b) * n + np.maximum(a, b))

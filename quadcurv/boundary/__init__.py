@@ -147,7 +147,7 @@ def _treated(mesh: Mesh, boundary: str) -> tuple[Stencils, NDArray[np.uint8]]:
     at_poles = None
     if isinstance(mesh, QuadGrid) and (found := poles(mesh)) is not None:
         at_poles = welded(mesh, found)
-    elif isinstance(mesh, QuadMesh) and (found := poles_of_faces(given, mesh.roundoff)) is not None:
+    elif isinstance(mesh, QuadMesh) and (found := poles_of_faces(given)) is not None:
         at_poles = welded_faces(given, found), found
     if at_poles is not None:
         treated, treatment = closed(*at_poles)

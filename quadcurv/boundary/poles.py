@@ -69,7 +69,7 @@ def _of_runs(one: Bools, number: Indices) -> Indices:
 
 
 @np.errstate(all="ignore")
-def poles_of_faces(stencils: Stencils, roundoff: float) -> Indices | None:
+def poles_of_faces(stencils: Stencils) -> Indices | None:
     """Border vertices of a face list at a pole: (n,), the first one there, else -1; None if none is.
 
     Those are joined by edges of no length, at least three of them.
@@ -85,7 +85,7 @@ def poles_of_faces(stencils: Stencils, roundoff: float) -> Indices | None:
     a, b = faces[row, slot], following[row, slot]
     size = np.abs(points[faces[row]] - points[a][:, None]).max(axis=2)
     size = np.where(faces[row] >= 0, size, 0.0).max(axis=1)
-    most = _POINT * size + 16 * roundoff * np.abs(points[a]).max(axis=1)
+    most = _POINT * size + 16 * stencils.roundoff * np.abs(points[a]).max(axis=1)
     one = (np.abs(points[a] - points[b]).max(axis=1) <= most) & (most < 1e-3 * size)
     if not one.any():
         return None
@@ -105,7 +105,7 @@ def welded_faces(stencils: Stencils, pole: Indices) -> Stencils:
     kept = np.concatenate(
         (_without_repetition(faces[~triangle]), faces[triangle & (a != b) & (b != c) & (c != a)])
     )
-    return Stencils(stencils.points, kept, stencils.shape, stencils.closed, stencils.orientable)
+    return replace(stencils, faces=kept)
 
 
 def welded(grid: QuadGrid, pole: Indices) -> tuple[Stencils, Indices]:

@@ -40,7 +40,7 @@ def evaluate_faces(mesh: QuadMesh, scheme: Laplacian, boundary: str, results: Ma
     """Regular vertices in one pass, the others from the stencils of the part of the mesh around them."""
     assert scheme.fast is not None
     others, part = mesh.irregular_part()
-    if others.size and poles_of_faces(part, mesh.roundoff) is not None:  # rare: all of it the slow way
+    if others.size and poles_of_faces(part) is not None:  # rare: all of it the slow way
         direct.evaluate(mesh.stencils(), one_rings(mesh, boundary), scheme, results)
         return
     _evaluate_rings(mesh, scheme.fast, results)
