@@ -3,6 +3,7 @@
 import numpy as np
 
 from quadcurv.kernels.compiled import flat, kernel
+from quadcurv.kernels.parts import place_of
 
 
 @kernel
@@ -60,14 +61,8 @@ def _add(matrices, faces, sides, indptr, indices, data):
         if v >= n:
             continue
         for j in range(sides):
-            low, high = indptr[v], indptr[v + 1]
-            while high - low > 1:
-                middle = (low + high) >> 1
-                if indices[middle] <= faces[first + j]:
-                    low = middle
-                else:
-                    high = middle
-            data[low] += matrices[c * sides + j]
+            at = place_of(indices, indptr[v], indptr[v + 1], faces[first + j])
+            data[at] += matrices[c * sides + j]
 
 
 def add(matrices, faces, indptr, indices, data):

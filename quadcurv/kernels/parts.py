@@ -8,9 +8,8 @@ _BITS = 21  # of each coordinate
 
 
 @helper
-def place_of(values, count, v):
-    """The last place of so many ascending values whose value is v at most."""
-    low, high = 0, count
+def place_of(values, low, high, v):
+    """The last place of ascending values from `low` up to `high` whose value is v at most, else `low`."""
     while high - low > 1:
         middle = (low + high) // 2
         if values[middle] <= v:
@@ -29,7 +28,7 @@ def _owners(faces, cuts, number, part, count):
             if v >= 0:
                 v = number[v] if renumbered else v
                 if v < cuts[last] or v >= cuts[last + 1]:  # mostly it is the part of the corner before
-                    last = place_of(cuts, cuts.size - 1, v)
+                    last = place_of(cuts, 0, cuts.size - 1, v)
                 p = last
             for t in range(s):
                 if part[4 * f + t] == p:
@@ -114,7 +113,7 @@ def _placed(faces, begin, own, beyond, place, out):
             elif k >= 0 and k < own.size:
                 out[4 * f + s] = own[k]
             else:
-                out[4 * f + s] = place[place_of(beyond, beyond.size, v)]
+                out[4 * f + s] = place[place_of(beyond, 0, beyond.size, v)]
 
 
 def placed(faces, begin, own, beyond, place):
