@@ -203,7 +203,7 @@ def face_jobs(n: int) -> tuple[Jobs, Jobs]:
     peers["scipy coo->csr"] = lambda: scipy.sparse.csr_array((local, (i, j)), shape=S.shape)
     if len(points) <= 2**20:
         peers["scipy assembly"] = lambda: scipy.sparse.csr_array(
-            (diamond(points[faces], np.zeros(len(faces)))[0].ravel(), (i, j)), shape=S.shape
+            (diamond(points[faces], 1.0)[0].ravel(), (i, j)), shape=S.shape
         )
     peers["igl.cotmatrix"] = lambda: igl.cotmatrix(points, cut)
     if len(points) <= 2**16:  # a million take it ten seconds and 2 GB

@@ -165,7 +165,7 @@ def put_area(points, sums, v, coarse, areas):
     """Write a vector area, zero where there is none but for rounding."""
     n, point = [sums[4 * v + x] for x in range(3)], triple(points, 3 * v, 1)
     square = 16.0 * dot(n, n)
-    known = (square > rounding(sums[4 * v + 3], coarse * dot(point, point))) & (square > LEAST)
+    known = (square > coarse * rounding(sums[4 * v + 3], dot(point, point))) & (square > LEAST)
     place(areas, 3 * v, 1, [where(known, x, 0.0) for x in n])
 
 

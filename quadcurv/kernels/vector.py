@@ -79,8 +79,8 @@ def dot(a, b):
 def rounding(edges, far):
     """Square of a cross product up to which it is zero but for the rounding of its factors and of points.
 
-    `edges` is the sum of the squares of the factors, `far` that of the coordinates of a point beside them,
-    times `coarse` everywhere: the square of how much coarser positions are rounded than doubles.
+    `edges` is the sum of the squares of the factors, `far` that of the coordinates of a point beside them. Of
+    positions that are rounded more coarsely than doubles it is larger by the square of how much: `coarse`.
     """
     return ROUNDING * edges * (edges + far)
 
@@ -90,7 +90,7 @@ def most_rounding(far, coarse):
 
     A difference of two points has at most four times it, the eight of a ring at most 32 times.
     """
-    return rounding(32.1 * far, coarse * far)
+    return coarse * rounding(32.1 * far, far)
 
 
 def middle(a, b, c, d):
@@ -101,7 +101,7 @@ def middle(a, b, c, d):
 def known_square(n, u, v, point, coarse):
     """Square of n = u x v of a quad about a point, zero where n is but for rounding."""
     square = dot(n, n)
-    return where(square > rounding(dot(u, u) + dot(v, v), coarse * dot(point, point)), square, 0.0)
+    return where(square > coarse * rounding(dot(u, u) + dot(v, v), dot(point, point)), square, 0.0)
 
 
 def known_ring_square(n, around, c, coarse):
@@ -112,7 +112,7 @@ def known_ring_square(n, around, c, coarse):
     square, spokes = dot(n, n), [less(a, c) for a in around]
     one, two, three, four = [dot(spoke, spoke) for spoke in spokes]
     edges = 2.0 * ((one + two) + (three + four))
-    return where(square > rounding(edges, coarse * dot(c, c)), square, 0.0)
+    return where(square > coarse * rounding(edges, dot(c, c)), square, 0.0)
 
 
 def quotient(x, y):

@@ -7,14 +7,13 @@ from collections.abc import Callable, Iterable, Iterator
 import numpy as np
 import scipy
 
-from quadcurv.schemes.triangles import squared_distance
 from quadcurv.stencils import Stencils
 from quadcurv.types import Floats, Ints
 
-Local = Callable[[Floats, Floats], tuple[Floats, Floats]]
+Local = Callable[[Floats, float], tuple[Floats, Floats]]
 """Corners (m, k, 3) of faces of k sides -> their matrices (m, k, k) and parts of the dual areas (m, k).
 
-The second argument (m,) tells how their corners are rounded: `far` of `triangles.length`.
+The second argument tells how corners are rounded: `Stencils.coarse`.
 """
 
 MOST_SIDES = 128  # of a polygon kept as one: its matrix is full
@@ -127,7 +126,6 @@ def _pieces(
         step = max(1, _ENTRIES // faces.shape[1] ** 2)
         for begin in range(0, len(faces), step):
             part = faces[begin : begin + step]
-            x = stencils.points[part]
             with np.errstate(all="ignore"):  # faces without area
-                matrices, parts = local(x, stencils.coarse * squared_distance(x))
+                matrices, parts = local(stencils.points[part], stencils.coarse)
             yield part, np.ascontiguousarray(matrices), parts

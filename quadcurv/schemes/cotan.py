@@ -6,7 +6,7 @@ import numpy as np
 
 from quadcurv.schemes.assembly import flux_from_faces, from_faces
 from quadcurv.schemes.base import Laplacian
-from quadcurv.schemes.triangles import EDGES, half_cotans, voronoi
+from quadcurv.schemes.triangles import EDGES, half_cotans, squared_distance, voronoi
 from quadcurv.types import Floats
 
 VALENCES = (4, 6, 8)
@@ -69,13 +69,13 @@ def cotan(valence: int = 6, area: str = "barycentric", diagonal: int = 0) -> Lap
         8: (range(4), [0, 2]),
     }[valence]
 
-    def local(x: Floats, far: Floats) -> tuple[Floats, Floats]:
+    def local(x: Floats, coarse: float) -> tuple[Floats, Floats]:
         if x.shape[1] == 3:
-            return _by_libigl(x, far, area)
+            return _by_libigl(x, coarse, area)
         matrices, parts = np.zeros((len(x), 4, 4)), np.zeros((len(x), 4))
         for s in corners:
             triangle = np.array([s - 1, s, s + 1]) % 4
-            K, third = _by_libigl(x[:, triangle], far, area)
+            K, third = _by_libigl(x[:, triangle], coarse, area)
             matrices[:, triangle[given, None], triangle] += K[:, given]
             parts[:, triangle[given]] += third[:, given]
         return matrices, parts
@@ -92,7 +92,7 @@ def cotan(valence: int = 6, area: str = "barycentric", diagonal: int = 0) -> Lap
     )
 
 
-def _by_libigl(x: Floats, far: Floats, area: str) -> tuple[Floats, Floats]:
+def _by_libigl(x: Floats, coarse: float, area: str) -> tuple[Floats, Floats]:
     """Stiffness (m, 3, 3) and dual areas (m, 3) of triangles (m, 3, 3), no two of which share a vertex."""
     import igl
 
@@ -105,7 +105,7 @@ def _by_libigl(x: Floats, far: Floats, area: str) -> tuple[Floats, Floats]:
     # The sum of the squared edges is twice that of the cotans times twice the area.
     thin = np.flatnonzero(~(4 * weights.sum(axis=1) < 1 / _THIN))
     if thin.size:
-        own, double = half_cotans(x[thin].transpose(1, 2, 0), far[thin])
+        own, double = half_cotans(x[thin].transpose(1, 2, 0), squared_distance(x[thin]), coarse)
         weights[thin] = own.T
         parts[thin] = voronoi(own, double).T if area == "voronoi" else double[:, None] / 6
     return np.tensordot(weights, EDGES, 1), parts

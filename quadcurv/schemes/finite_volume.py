@@ -72,8 +72,8 @@ def _assemble(stencils: Stencils) -> tuple[scipy.sparse.csr_array, Floats]:
     S, _ = assembled(stencils, [stencils.faces[stencils.faces[:, 3] >= 0]], diamond, n)
     if stencils.has_triangles:
         corners, place, points = _flap_points(stencils)
-        far = stencils.coarse * squared_distance(stencils.points[corners[:, :1]])
-        row = diamond(points[corners], far)[0][:, 0]
+        far = squared_distance(stencils.points[corners[:, :1]])
+        row = diamond(points[corners], stencils.coarse, far)[0][:, 0]
         where = np.repeat(corners[:, 0], 4), corners.ravel()
         flaps = scipy.sparse.csr_array((row.ravel(), where), (p, len(points)))[:n]
         S = S + flaps[:, :p] + flaps[:, p:] @ place

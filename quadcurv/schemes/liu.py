@@ -12,8 +12,8 @@ from quadcurv.stencils import Stencils
 from quadcurv.types import Floats
 
 
-def _local(x: Floats, far: Floats) -> tuple[Floats, Floats]:
-    return linear(x, far) if x.shape[1] == 3 else diamond(x, far)
+def _local(x: Floats, coarse: float) -> tuple[Floats, Floats]:
+    return linear(x, coarse) if x.shape[1] == 3 else diamond(x, coarse)
 
 
 def _flux(stencils: Stencils) -> tuple[Floats, Floats]:

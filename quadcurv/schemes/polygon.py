@@ -16,6 +16,7 @@ from quadcurv.schemes.triangles import (
     half_cotans,
     length,
     linear,
+    squared_distance,
     voronoi,
 )
 from quadcurv.types import Floats
@@ -49,8 +50,8 @@ def bunge() -> Laplacian:
     'bunge'
     """
 
-    def local(x: Floats, far: Floats) -> tuple[Floats, Floats]:
-        arm, _ = _in_plane(x, far)
+    def local(x: Floats, coarse: float) -> tuple[Floats, Floats]:
+        arm, _ = _in_plane(x, coarse)
         _, k, m = arm.shape
         if k == 3:
             virtual, weights = np.zeros((3, m)), np.full((3, m), 1 / 3)
@@ -58,11 +59,11 @@ def bunge() -> Laplacian:
             virtual = _virtual_vertex(arm)
             weights = 1 / k + _least_weights(arm, virtual)
         fan = arm, np.roll(arm, -1, axis=1), np.broadcast_to(virtual[:, None], arm.shape)
-        halves, double = half_cotans(fan, far)
+        halves, double = half_cotans(fan, squared_distance(x), coarse)
         own, following, middle = voronoi(halves, double)
         parts = own + np.roll(following, 1, axis=0) + weights * middle.sum(axis=0)
         if k == 3:
-            return linear(x, far)[0], parts.T
+            return linear(x, coarse)[0], parts.T
         # Weights of the edges to the virtual vertex, those of the sides, and the virtual vertex left out.
         spoke, side = halves[1] + np.roll(halves[0], 1, axis=0), halves[2]
         mixed = (spoke.sum(axis=0) / 2 * weights - spoke) * weights[:, None]
@@ -76,7 +77,7 @@ def bunge() -> Laplacian:
         spokes = arm - virtual[:, None]
         over = np.flatnonzero((cross(spokes, np.roll(spokes, -1, axis=1))[2] <= 0).any(axis=0))
         if over.size:
-            matrices[over], parts[over] = cut_up(x[over], far[over], voronoi)
+            matrices[over], parts[over] = cut_up(x[over], coarse, voronoi)
         return matrices, parts
 
     return _scheme("bunge", "Bunge, Herholz, Kazhdan and Botsch 2020", local)
@@ -114,10 +115,10 @@ def de_goes(stabilisation: float = 1.0) -> Laplacian:
     """
     _checked(stabilisation)
 
-    def local(x: Floats, far: Floats) -> tuple[Floats, Floats]:
+    def local(x: Floats, coarse: float) -> tuple[Floats, Floats]:
         if x.shape[1] == 3:
-            return linear(x, far)
-        arm, area = _in_plane(x, far)
+            return linear(x, coarse)
+        arm, area = _in_plane(x, coarse)
         edge, middle = _edges(arm)
         sharp = np.stack((-middle[1], middle[0])) / area
         rest = np.eye(x.shape[1])[..., None] - np.einsum("xim,xjm->ijm", edge[:2], sharp)
@@ -159,10 +160,10 @@ def alexa_wardetzky(stabilisation: float = 1.0) -> Laplacian:
     """
     _checked(stabilisation)
 
-    def local(x: Floats, far: Floats) -> tuple[Floats, Floats]:
+    def local(x: Floats, coarse: float) -> tuple[Floats, Floats]:
         if x.shape[1] == 3:
-            return linear(x, far)
-        arm, area = _in_plane(x, far)
+            return linear(x, coarse)
+        arm, area = _in_plane(x, coarse)
         edge, middle = _edges(arm)
         seen = _orthonormal(edge[:2])  # what the projected edges span
         rest = np.eye(x.shape[1])[..., None] - np.einsum("xim,xjm->ijm", seen, seen)
@@ -182,7 +183,7 @@ def _scheme(name: str, reference: str, local: Local) -> Laplacian:
     return Laplacian(name, 2, reference, assemble, flux, polygons=True)
 
 
-def _in_plane(x: Floats, far: Floats) -> tuple[Floats, Floats]:
+def _in_plane(x: Floats, coarse: float) -> tuple[Floats, Floats]:
     """Corners (3, k, m) of faces (m, k, 3) relative to their mean, and their areas (m,), NaN without one.
 
     The area is that of the largest projection, across the vector area. The last coordinate is that along the
@@ -192,7 +193,7 @@ def _in_plane(x: Floats, far: Floats) -> tuple[Floats, Floats]:
     arm -= arm.mean(axis=1, keepdims=True)
     edge, _ = _edges(arm)
     vector = cross(arm, edge).sum(axis=1)
-    double = length(vector, dot(edge, edge).sum(axis=0), far)
+    double = length(vector, dot(edge, edge).sum(axis=0), squared_distance(x), coarse)
     normal = vector / double
     flat = edge - normal[:, None] * dot(edge, normal[:, None])
     square = dot(flat, flat)

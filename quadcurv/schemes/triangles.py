@@ -23,9 +23,9 @@ EDGES = np.array(
 )
 
 
-def linear(x: Floats, far: Floats) -> tuple[Floats, Floats]:
+def linear(x: Floats, coarse: float) -> tuple[Floats, Floats]:
     """Cotan matrices (m, 3, 3) of triangles (m, 3, 3), and a third of their areas at each corner (m, 3)."""
-    weights, double = half_cotans(x.transpose(1, 2, 0), far)
+    weights, double = half_cotans(x.transpose(1, 2, 0), squared_distance(x), coarse)
     return np.tensordot(weights, EDGES, ((0,), (0,))), thirds(weights, double).T
 
 
@@ -35,13 +35,13 @@ def thirds(weights: Floats, double: Floats) -> Floats:
 
 
 def cut_up(
-    x: Floats, far: Floats, areas: Callable[[Floats, Floats], Floats] = thirds
+    x: Floats, coarse: float, areas: Callable[[Floats, Floats], Floats] = thirds
 ) -> tuple[Floats, Floats]:
     """As `linear`, of polygons (m, k, 3) that are cut into triangles, `areas` giving the parts of each."""
     m, k, _ = x.shape
     triangles, polygon = cut(x.reshape(-1, 3), np.arange(0, m * k + 1, k), np.arange(m * k, dtype=np.int32))
     corners = x.reshape(-1, 3)[triangles].transpose(1, 2, 0)
-    weights, double = half_cotans(corners, far[polygon])
+    weights, double = half_cotans(corners, squared_distance(x)[polygon], coarse)
     matrices, parts, slots = np.zeros((m, k, k)), np.zeros((m, k)), triangles % k
     where = polygon[:, None, None], slots[:, :, None], slots[:, None]
     np.add.at(matrices, where, np.tensordot(weights, EDGES, ((0,), (0,))))
@@ -49,10 +49,10 @@ def cut_up(
     return matrices, parts
 
 
-def half_cotans(corners: Iterable[Floats], far: Floats) -> tuple[Floats, Floats]:
+def half_cotans(corners: Iterable[Floats], far: Floats, coarse: float) -> tuple[Floats, Floats]:
     """Halves of the cotans (3, ...) at corners of triangles, and twice their areas (...), NaN without area.
 
-    Each of the three corners is (3, ...); `far` as in `length`, of what they belong to.
+    Each of the three corners is (3, ...), `far` the squared distance from the origin of what they belong to.
     """
     a, b, c = corners
     across_a, across_b, across_c = c - b, a - c, b - a
@@ -60,7 +60,7 @@ def half_cotans(corners: Iterable[Floats], far: Floats) -> tuple[Floats, Floats]
     # Area between the two shortest edges: of a needle nothing cancels.
     one = np.where(aa >= np.maximum(bb, cc), across_b, across_a)
     other = np.where(cc > np.maximum(aa, bb), across_b, across_c)
-    double = length(cross(one, other), aa + bb + cc, far)
+    double = length(cross(one, other), aa + bb + cc, far, coarse)
     products = dot(across_b, across_c), dot(across_c, across_a), dot(across_a, across_b)
     return np.stack(products) / (-2 * double), double
 
@@ -83,16 +83,16 @@ def squared_distance(x: Floats) -> Floats:
     return np.einsum("mx,mx->m", middle, middle)
 
 
-def length(product: Floats, edges: Floats, far: Floats) -> Floats:
+def length(product: Floats, edges: Floats, far: Floats, coarse: float) -> Floats:
     """Length (...) of cross products (3, ...), NaN where these are zero but for rounding.
 
-    `edges` is the sum of the squares of the factors, `far` the squared distance from the origin, times
-    `Stencils.coarse`.
+    `edges` is the sum of the squares of the factors, `far` the squared distance from the origin; for `coarse`
+    see `kernels.vector.rounding`.
     """
     from quadcurv.kernels import vector
 
     square = dot(product, product)
-    return np.where(square > vector.rounding(edges, far), np.sqrt(square), np.nan)
+    return np.where(square > coarse * vector.rounding(edges, far), np.sqrt(square), np.nan)
 
 
 def dot(a: Floats, b: Floats) -> Floats:
