@@ -30,10 +30,10 @@ def jet(degree: int | None = None, rings: int | None = None) -> Fit:
     ----------
     degree : {2, 3, 4, 6}, optional
         By default ("jet") chosen vertex by vertex, with rings and weights: where the surface is resolved a
-        polynomial of degree 6 over three rings and over the nearest sphere instead of the plane, through the
-        vertex and with weights that fall with the distance; where noise prevails plain least squares of
-        degree 6, 4 or 2 over three to eight rings, those of the least noise and bias together, both estimated
-        from residuals of neighbours; beside rough borders one-sided fits over more.
+        polynomial of degree 6 over three rings, over the nearest sphere or the plane, whichever leaves less,
+        through the vertex and with weights that fall with the distance; where noise prevails plain least
+        squares of degree 6, 4 or 2 over three to eight rings, those of the least noise and bias together,
+        both estimated from residuals of neighbours; beside rough borders one-sided fits over more.
     rings : int, optional
         Rings of faces around a vertex whose vertices are fitted, on a grid the window of
         (2 rings + 1)^2 points. By default 1 for degree 2, 3 for degree 6 and 2 for the others.
