@@ -215,3 +215,13 @@ def test_what_is_no_pole_of_a_face_list():
         mesh = qc.QuadGrid(points).to_mesh()
         assert poles_of_faces(mesh.stencils()) is None
     assert poles_of_faces(grid.to_mesh().stencils()) is None
+
+
+@pytest.mark.parametrize("scheme", [name for name in ALL if name not in DIVERGENT])
+def test_poles_of_grids_with_holes(scheme):
+    """Which are face lists; one hole ends at a pole."""
+    hidden = np.zeros((24, 13), bool)
+    hidden[5:7, 5:7] = hidden[:2, :3] = True
+    H = np.abs(qc.mean_curvature(qc.QuadGrid(ball(24, 13), (True, False), mask=hidden), scheme))
+    assert np.isfinite(H[~hidden]).all()
+    assert np.abs(H[~hidden] - 1).max() < (0.2 if scheme == "jet-2" else 0.1)
