@@ -274,6 +274,16 @@ def test_normals_on_the_boundary_converge(cells):
     assert errors[1] < errors[0] / 3.2
 
 
+@pytest.mark.parametrize("degree", [4, 5])
+def test_lines_whose_differences_vanish_to_the_last_digit_are_smooth(degree):
+    """A quadratic on a grid of binary fractions: nothing over nothing is no doubt."""
+    x, y = np.meshgrid(np.arange(17) / 16, np.arange(13) / 16, indexing="ij")
+    layer = ghosts(QuadGrid(np.stack((x, y, x * y + x * x), axis=-1)).stencils(), degree, 3)
+    beyond = layer.points[np.isfinite(layer.points).all(axis=1)]
+    assert np.count_nonzero(layer.smooth) == 2 * (17 + 13) - 4
+    assert np.abs(beyond[:, 2] - beyond[:, 0] * (beyond[:, 1] + beyond[:, 0])).max() < 1e-11
+
+
 # ---- where there are no ghosts ------------------------------------------------------------------------
 
 

@@ -182,7 +182,7 @@ def _error(terms: Floats, ghosts: Floats, ends: _Ends, degree: int) -> tuple[Flo
     most = np.maximum(SMOOTH * _dot(before, normal) ** 2, EARLIER * _dot(earlier, normal) ** 2)
     most += HIDDEN * _dot(before, before)
     if degree > 4:
-        most = np.minimum(most, _EXPECTED * _dot(before, before) ** 2 / _dot(first, first))
+        most = np.fmin(most, _EXPECTED * _dot(before, before) ** 2 / _dot(first, first))  # 0 of exact lines
     excess = np.maximum(all_ - expected, along - most) - rounding
     steps = np.diff(ghosts, axis=1, prepend=0.0)
     outward, edge = -np.einsum("klx,kx->kl", steps, inward), _dot(inward, inward)

@@ -284,9 +284,10 @@ def _continued(stencils: Stencils, layers: int) -> list[_Beyond]:
     faces = np.concatenate((part.faces, layer.quads))
     closed = part.closed | layer.smooth
     unsure = np.flatnonzero(np.isfinite(layer.error) & ~layer.smooth)
-    # What is looked at with many others, by polynomials of a higher degree, must be right beyond doubt.
-    share = 1.0 if layers < _GHOST_LAYERS else _SURE
-    closed[unsure] = layer.error[unsure] <= share * fitted(part, unsure).error
+    if unsure.size:
+        # What is looked at with many others, by polynomials of a higher degree, must be right beyond doubt.
+        share = 1.0 if layers < _GHOST_LAYERS else _SURE
+        closed[unsure] = layer.error[unsure] <= share * fitted(part, unsure).error
     ghosted = replace(part, points=points, faces=faces, closed=closed)
     near = np.arange(len(points)) >= part.n
     bad = np.zeros(len(points), bool)
