@@ -98,13 +98,13 @@ def fitted(stencils: Stencils, vertices: Indices) -> Surfaces:
     near = np.where((around >= 0) & (ring <= 2), place[around], -1)
     indptr = np.concatenate(([0], np.cumsum((near >= 0).sum(axis=1))))
     shared = nearby.means(indptr, near[near >= 0], noise**2)
-    noise = np.where(np.isfinite(noise), np.sqrt(shared), np.inf)
+    own, noise = noise, np.where(np.isfinite(noise), np.sqrt(shared), np.inf)
     with np.errstate(invalid="ignore"):  # an infinite one times nothing is none
         error = np.where(np.isfinite(noise), noise * gain, np.inf)
     distance = _distance(stencils, around, ring)[:, None]
     known = _wide(stencils, around, ring)[:, None] & (error < _DETERMINED * distance)
     with np.errstate(invalid="ignore"):
-        known &= noise * found[..., kernel.BEND] * distance < _DETERMINED
+        known &= np.maximum(own, noise) * found[..., kernel.BEND] * distance < _DETERMINED
     error = np.where(known, error, np.inf)
     best = np.arange(k), np.argmin(error, axis=1)
     found = found[best]
