@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+import warnings
 from collections.abc import Callable
 from dataclasses import replace
 from importlib import import_module
@@ -17,7 +18,7 @@ from comparisons.chapter3 import measure as surfaces
 from comparisons.chapter4 import measure as formulas
 from comparisons.claims import judge, markdown
 from comparisons.measured import Measured
-from quadcurv import StaggeredGrid
+from quadcurv import MeshWarning, StaggeredGrid
 from quadcurv.kernels import border
 from quadcurv.schemes import SCHEMES, Laplacian
 from quadcurv.surfaces import Surface, catenoid
@@ -230,7 +231,8 @@ def test_all_verdicts_are_as_declared(right):
 def test_nothing_wrong_keeps_its_verdict(monkeypatch, right, name):
     mutate, _, _, claim = MUTANTS[name]
     mutate(monkeypatch)
-    with np.errstate(all="ignore"):
+    with np.errstate(all="ignore"), warnings.catch_warnings():
+        warnings.simplefilter("ignore", MeshWarning)  # what is spoilt may be warned of, too
         wrong = judged(all_scripts())
     assert wrong[claim].wrong
     for text, judgement in wrong.items():

@@ -69,7 +69,7 @@ class VtkHdf:
         return f"VtkHdf({self.points.shape[0]} points, {self.faces.shape[0]} faces)"
 
     def values(self, name: str, *more: int) -> Any:
-        """Dataset of float64 (n, *more) of values at the points, made if there is none of that name."""
+        """Dataset of float64 ``(n, *more)`` of values at the points, made if there is none of that name."""
         shape = (self.points.shape[0], *more)
         return self._group.require_group("PointData").require_dataset(name, shape, "float64")
 
@@ -78,7 +78,7 @@ class VtkHdf:
         return Rows(self.points, r, c)
 
     def grid_values(self, name: str, r: int, c: int, *more: int) -> Rows:
-        """:meth:`values` of such a grid, (r, c, *more)."""
+        """:meth:`values` of such a grid, ``(r, c, *more)``."""
         return Rows(self.values(name, *more), r, c)
 
 
