@@ -124,7 +124,7 @@ def test_counts_of_a_mesh_are_printed(tmp_path, capsys):
         "faces: 2 quads, 4 triangles (1 larger polygon(s) cut into such); 1 turned",
         "vertices: 10, 1 of them where another one is",
         "valence: " + ", ".join(f"{v} ({(valence == v).sum()})" for v in np.unique(valence)),
-        "rings: 1 interior, 0 extrapolated, 4 fitted, 5 open",
+        "rings: 1 interior, 0 extrapolated, 1 fitted, 8 open",
         f"undefined: {H.count('nan')} of mean_curvature",
     ]
     assert run("compare", path, "-s", "liu", "--output", tmp_path) == 0
