@@ -141,7 +141,9 @@ def doublet(s, rng):
     faces.append([a, n, c, d])
     points = np.vstack((s.points.reshape(-1, 3), s.points.reshape(-1, 3)[[a, b, c, d]].mean(axis=0)))
     H = np.append(s.H.ravel(), s.H.ravel()[[a, b, c, d]].mean())
-    explained = around(s, faces, [a, b, c, d, n], H.size, 2 * s.bend)
+    near = np.zeros(H.size, bool)
+    near[[a, b, c, d, n]] = True  # off the surface, and read by fits over three rings
+    explained = around(s, faces, np.flatnonzero(with_neighbours(near, faces)), H.size, 2 * s.bend)
     return Damaged(points, lambda x: qc.QuadMesh(x, faces), H, explained)
 
 

@@ -723,8 +723,8 @@ def check_stencils(mesh, boundary):
     stencils = qc.one_rings(mesh, boundary)
     table, points = stencils.corner_table, stencils.points
     assert np.isfinite(points).all()
-    assert stencils.faces.min() >= -1
-    assert stencils.faces.max() < len(points)
+    assert stencils.faces.min(initial=0) >= -1
+    assert stencils.faces.max(initial=-1) < len(points)
     assert table.indptr.shape == (stencils.n + 1,)
     assert np.array_equal(table.centre, np.repeat(np.arange(stencils.n), np.diff(table.indptr)))
     check(stencils.ring_areas, (stencils.n, 3))

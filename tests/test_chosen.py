@@ -68,7 +68,7 @@ def test_order_under_jitter(name, layout, sizes, rate, bound):
     ("case", "H", "K"),
     [
         (cases.on(cases.STAR, cases.catmull_clark(cases.dodecahedron(), 4)), 4e-4, 1.5e-3),
-        (cases.patch(34, 0.2, 11), 7e-6, 7e-6),
+        (cases.patch(34, 0.2, 11), 1e-5, 1e-5),
         (cases.cyclide(48, 48), 3e-4, 6e-4),
     ],
     ids=["star", "patch", "cyclide"],

@@ -31,6 +31,7 @@ _MORE = {4: 7.0, 2: 12.0}  # the same, less its own, by any two degrees more, wh
 # Times that at most where such a fit is one-sided, and the same where it is hardly determined, as measured
 # along borders: of what magnifies noise most a smooth surface has least.
 _ONE_SIDED, _HARDLY = 2.0, 2.0
+_ONE_SIDED_AT_MOST = 16.0  # the first of these in intervals: what a few terms alike make of H there
 _NEXT = 3.0  # times the square of what noise grows to by degree 6, by degree 8
 # Shares of the noise's square: what terms may be off by chance, and what noise may grow by with every ring.
 _CHANCE, _UNEVEN = 0.2, 0.02
@@ -124,14 +125,17 @@ def _candidates(
         excess = np.maximum(per_term - (1 + _CHANCE) * noise2, 0.0)
         gain2 = lower[:, kernel.GAIN] ** 2
         most = _MORE[degree] * gain2
-        less = np.clip(before.gain2 - gain2, 0.0, _ONE_SIDED * most)
         known = np.isfinite(before.fits[:, kernel.CONDITION])
-        less = np.where(before.good, less, np.where(known, _HARDLY * gain2, most))
+        otherwise = np.where(known, _HARDLY * gain2, most)
+        less, more = (
+            np.where(before.good, np.clip(before.gain2 - gain2, 0.0, times * most), otherwise)
+            for times in (_ONE_SIDED, _ONE_SIDED_AT_MOST)
+        )
         # Where the fit before is hardly determined its own bias is that of what this one does not look at.
         share = np.minimum(1.0, (gain2 + most) / before.gain2)
         seen = excess * less + np.nan_to_num(share * before.bias2)
         left = before.most2 * (gain2 / before.gain2)
-        most = np.maximum(per_term - noise2, 0.0) * less + np.nan_to_num(left)
+        most = np.maximum(per_term - noise2, 0.0) * more + np.nan_to_num(left)
         before = Candidate(lower, degree, seen, most, noise2)
         yield before
 

@@ -38,7 +38,8 @@ _DIGITS = 2.0**-46
 # is so little that no fit over more rings is better.
 _RESOLVED, _CLEARLY = 5.0, 15.0
 _WORTH = 2.0  # the same, from which on other fits are tried
-_LESS = 0.7  # of what one fit leaves, as much as another must: what noise leaves is no choice
+# Of what one fit leaves, as much as another must: what noise leaves is no choice. The same of one-sided fits.
+_LESS, _FAR_LESS = 0.7, 0.3
 # Where noise prevails of which nobody near knows how large it is.
 _MORE = ((4, 3), (4, 4), (4, 5), (2, 3), (2, 4))
 _QUANTILE = 0.975
@@ -216,7 +217,8 @@ def _smooth(around: Neighbourhoods, vertices: Indices, d: int, r: int, ghosts: b
     """Fits through the vertex over the nearest sphere, or over the plane where these leave less.
 
     Spheres make short work of what is round, and of what is not they make terms of higher degree. With terms
-    of the highest degrees and without: along straight lines of a mesh these go through all of a few rows.
+    of the highest degrees and without: along straight lines of a mesh these go through all of a few rows. One
+    side alone tells less.
     """
     from quadcurv.kernels import jet as kernel
 
@@ -224,7 +226,8 @@ def _smooth(around: Neighbourhoods, vertices: Indices, d: int, r: int, ghosts: b
     at = np.flatnonzero(~(_explained(fits, d) < _WORTH) & ~_exact(fits, around.rounding))
     flat = around.polynomials(vertices[at], d, r, ghosts, kernel.FLAT)
     left, before = (x[:, [kernel.SQUARE, kernel.LOWER]] for x in (flat, fits[at]))
-    better = (np.isfinite(left) & ~(left >= _LESS * before)).all(axis=1)
+    less = _LESS if ghosts else _FAR_LESS
+    better = (np.isfinite(left) & ~(left >= less * before)).all(axis=1)
     fits[at[better]] = flat[better]
     return fits
 
