@@ -39,7 +39,7 @@ def rounding_error(mesh: Mesh | GridBlocks) -> tuple[float, float]:
 
 
 def _looked_for(mesh: Mesh | GridBlocks) -> tuple[float, float]:
-    from quadcurv.kernels.extent import face_steps, grid_steps
+    from quadcurv.kernels.extent import steps
 
     if isinstance(mesh, GridBlocks):
         begin, end = zip(*map(_ends, mesh), strict=True)
@@ -47,9 +47,7 @@ def _looked_for(mesh: Mesh | GridBlocks) -> tuple[float, float]:
     points = _points(mesh)
     if is_on_device(points) or (isinstance(mesh, QuadGrid) and mesh.mask is not None):
         return error_at_edges(*_ends(mesh), mesh.roundoff)
-    if isinstance(mesh, QuadMesh):
-        return _error(mesh.roundoff, *face_steps(points, mesh.faces, _every(len(mesh.faces))))
-    return _error(mesh.roundoff, *grid_steps(points, _every(points.shape[0] * points.shape[1])))
+    return _error(mesh.roundoff, *steps(points, *_edges(mesh)))
 
 
 def error_at_edges(begin: Floats, end: Floats, roundoff: float) -> tuple[float, float]:
@@ -116,17 +114,20 @@ def _points(mesh: Mesh) -> Any:
     return mesh.primal if isinstance(mesh, StaggeredGrid) else mesh.points
 
 
-def _ends(mesh: Mesh) -> tuple[Floats, Floats]:
-    """Positions (k, 3) of the ends of some edges, in memory wherever the mesh is."""
-    x = _points(mesh)
+def _edges(mesh: Mesh) -> tuple[Indices, Indices]:
+    """Numbers of the vertices at the ends of some edges."""
     if isinstance(mesh, QuadMesh):
-        faces = mesh.faces[:: _every(len(mesh.faces))]
-        first, second = faces[:, [0, 1]].ravel(), faces[:, [1, 2]].ravel()
-    else:
-        r, c = x.shape[:2]
-        i, j = sample(r, c)
-        above, left = np.clip(i, 0, max(r - 2, 0)), np.clip(j, 0, max(c - 2, 0))
-        first = np.concatenate((above * c + j, i * c + left))
-        second = np.concatenate((np.minimum(above + 1, r - 1) * c + j, i * c + np.minimum(left + 1, c - 1)))
-    x = x.reshape(-1, 3)
+        faces = mesh.faces[:: _every(len(mesh.faces))].astype(np.int64)
+        return faces[:, [0, 1]].ravel(), faces[:, [1, 2]].ravel()
+    r, c = _points(mesh).shape[:2]
+    i, j = sample(r, c)
+    # Of a single row or column these edges end where they begin.
+    above, left = (np.maximum(np.minimum(k, size - 2), 0) for k, size in ((i, r), (j, c)))
+    first = np.concatenate((above * c + j, i * c + left))
+    return first, first + np.repeat((c * (r > 1), int(c > 1)), i.size)
+
+
+def _ends(mesh: Mesh) -> tuple[Floats, Floats]:
+    """Positions (k, 3) of these ends, in memory wherever the mesh is."""
+    x, (first, second) = _points(mesh).reshape(-1, 3), _edges(mesh)
     return on_host(taken(x, first)), on_host(taken(x, second))

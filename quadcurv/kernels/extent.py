@@ -36,11 +36,12 @@ def largest(values):
     return found[0] if len(found) == 1 else float(np.max(found))
 
 
-def measured(points, ends, square):
+@formula
+def measured(points, first, second, square):
     """Squares of the lengths of steps; the largest coordinate of their ends, the largest extent of these."""
     low, high = Carried((inf,) * 3), Carried((-inf,) * 3)
     for k in span(0, square.size):
-        a, b = (triple(points, 3 * end, 1) for end in ends(k))
+        a, b = triple(points, 3 * first[k], 1), triple(points, 3 * second[k], 1)
         step = less(b, a)
         square[k] = dot(step, step)
         lower, higher = ([some(x, y) for x, y in zip(a, b, strict=True)] for some in (smaller, larger))
@@ -52,43 +53,9 @@ def measured(points, ends, square):
     return far, extent
 
 
-@formula
-def measured_steps(points, first, second, square):
-    """As `measured`."""
-    return measured(points, lambda k: (first[k], second[k]), square)
-
-
-@formula
-def measured_grid(points, r, c, every, square):
-    """As `measured`, from points of a grid to those in the next row, then to those in the next column."""
-    number = square.size >> 1
-
-    def ends(k):
-        along = k >= number
-        at = every * where(along, k - number, k)
-        last = where(along, at % c == c - 1, at >= (r - 1) * c)
-        # Of a single row or column these steps end where they begin.
-        step = where(along, where(c > 1, 1, 0), where(r > 1, c, 0))
-        first = where(last, at - step, at)
-        return first, first + step
-
-    return measured(points, ends, square)
-
-
-@formula
-def measured_faces(points, faces, every, square):
-    """As `measured`, along the first two edges of faces."""
-
-    def ends(k):
-        corner = 4 * every * (k >> 1) + (k & 1)
-        return faces[corner], faces[corner + 1]
-
-    return measured(points, ends, square)
-
-
 @kernel
 def _steps(points, first, second, square):
-    return measured_steps(points, first, second, square)
+    return measured(points, first, second, square)
 
 
 def steps(points, first, second):
@@ -98,26 +65,3 @@ def steps(points, first, second):
     """
     square = np.empty(first.size)
     return square, *_steps(flat(points), flat(first), flat(second), square)
-
-
-@kernel
-def _grid_steps(points, r, c, every, square):
-    return measured_grid(points, r, c, every, square)
-
-
-def grid_steps(points, every):
-    """As `steps`, from points (r, c, 3) of a grid to those in the next row and column, one of so many."""
-    r, c, _ = points.shape
-    square = np.empty(2 * -(-r * c // every))
-    return square, *_grid_steps(flat(points), r, c, every, square)
-
-
-@kernel
-def _face_steps(points, faces, every, square):
-    return measured_faces(points, faces, every, square)
-
-
-def face_steps(points, faces, every):
-    """As `steps`, along the first two edges of one of so many faces (m, 4)."""
-    square = np.empty(2 * -(-len(faces) // every))
-    return square, *_face_steps(flat(points), flat(faces), every, square)
