@@ -11,7 +11,7 @@ from quadcurv.mesh import GridBlocks, Mesh, QuadGrid, QuadMesh, StaggeredGrid
 from quadcurv.types import Floats, Indices, PrecisionWarning, warn
 
 _SAMPLE = 512  # of the edges, whose lengths are looked at
-_FOUND = "rounding_error"  # where a mesh keeps what was found of it
+_FOUND = "magnified_rounding"  # where a mesh keeps what was found of it
 _VALUES = 4096  # of the mean curvature, of which the median is taken
 _NOTED = 0.01  # of the mean curvature
 
@@ -32,22 +32,23 @@ def rounding_error(mesh: Mesh | GridBlocks) -> tuple[float, float]:
     extent : float
         Largest side of the bounding box, in length; both are of a sample of the edges.
     """
-    if _FOUND not in mesh.__dict__:  # of a mesh, whose points do not change
-        mesh.__dict__[_FOUND] = _looked_for(mesh)
-    found: tuple[float, float] = mesh.__dict__[_FOUND]
-    return found
+    if _FOUND not in mesh.__dict__:  # of the points alone: copies of a mesh may be rounded otherwise
+        mesh.__dict__[_FOUND] = _magnified(mesh)
+    by, extent = mesh.__dict__[_FOUND]
+    return mesh.roundoff * by, extent
 
 
-def _looked_for(mesh: Mesh | GridBlocks) -> tuple[float, float]:
+def _magnified(mesh: Mesh | GridBlocks) -> tuple[float, float]:
+    """The same for a roundoff of 1."""
     from quadcurv.kernels.extent import steps
 
     if isinstance(mesh, GridBlocks):
         begin, end = zip(*map(_ends, mesh), strict=True)
-        return error_at_edges(np.concatenate(begin), np.concatenate(end), mesh.roundoff)
+        return error_at_edges(np.concatenate(begin), np.concatenate(end), 1.0)
     points = _points(mesh)
     if is_on_device(points) or (isinstance(mesh, QuadGrid) and mesh.mask is not None):
-        return error_at_edges(*_ends(mesh), mesh.roundoff)
-    return _error(mesh.roundoff, *steps(points, *_edges(mesh)))
+        return error_at_edges(*_ends(mesh), 1.0)
+    return _error(1.0, *steps(points, *_edges(mesh)))
 
 
 def error_at_edges(begin: Floats, end: Floats, roundoff: float) -> tuple[float, float]:

@@ -255,6 +255,12 @@ def test_rounding_of_a_single_row_of_cells_is_that_of_its_edges(shape):
     assert extent == pytest.approx(np.ptp(points, axis=0).max())
 
 
+def test_rounding_of_a_copy_that_is_rounded_otherwise_is_its_own():
+    grid = surfaces.torus().sample((12, 10))[0]
+    error, extent = rounding_error(grid)
+    assert rounding_error(grid.with_roundoff(2.0**-24)) == (error * 2.0**29, extent)
+
+
 def test_rounding_that_shows_is_warned_of():
     grid = surfaces.sphere().sample((400, 200))[0]
     far = QuadGrid((grid.points + 20).astype(np.float32), grid.wrap)
