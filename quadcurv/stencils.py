@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, NamedTuple
 
@@ -127,6 +127,13 @@ class Stencils:
     def n(self) -> int:
         """Number of vertices with a stencil."""
         return int(np.prod(self.shape))
+
+    def part(self, vertices: Indices, faces: Ints) -> Stencils:
+        """Those of some vertices with stencils, by faces of these in their own numbers."""
+        closed = self.closed[vertices]
+        return replace(
+            self, points=self.points[vertices], faces=faces, shape=closed.shape, closed=closed, polygons=None
+        )
 
     @property
     def has_triangles(self) -> bool:

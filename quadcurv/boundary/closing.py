@@ -34,8 +34,7 @@ def closed(given: Stencils, pole: Indices | None = None) -> tuple[Stencils, NDAr
     if border.size == 0:
         return given, treatment
     vertices, faces = topology.part_around(given.faces, border, given.n, REACH)
-    points, known = given.points[vertices], given.closed[vertices]
-    part = Stencils(points, faces, vertices.shape, known, given.orientable, roundoff=given.roundoff)
+    part = given.part(vertices, faces)
     layer = ghosts(part)
     if pole is None:
         star_of = _stars(part, layer)

@@ -137,13 +137,8 @@ def parts_at_poles(grid: QuadGrid) -> list[tuple[Indices, QuadGrid, Bools]]:
             of_side = around[:-2] | around[1:-1] | around[2:]
             np.moveaxis(beside, axis, 0)[[0, 1] if end == 0 else [-1, -2]] = of_side
             wrap = [w and i != axis for i, w in enumerate(grid.wrap)]
-            near.append(
-                (
-                    number[cut].ravel(),
-                    QuadGrid(grid.points[cut], wrap).with_roundoff(grid.roundoff),
-                    beside.ravel(),
-                )
-            )
+            part = QuadGrid(grid.points[cut], wrap).with_roundoff(grid.roundoff)
+            near.append((number[cut].ravel(), part, beside.ravel()))
     return near
 
 

@@ -15,7 +15,7 @@ import numpy as np
 from quadcurv.boundary import REACH, checked_boundary, closed, poles
 from quadcurv.device_arrays import as_cupy, is_on_device, on_host, taken
 from quadcurv.drivers import answers, compiled, direct
-from quadcurv.drivers.targets import Kind, targets
+from quadcurv.drivers.targets import Kind, checked_out, targets
 from quadcurv.mesh import QuadGrid, QuadMesh
 from quadcurv.schemes import Fit, Laplacian, Scheme
 from quadcurv.stencils import Stencils, coarse
@@ -59,7 +59,7 @@ def evaluate(
     checked_boundary(boundary)
     checked_scheme(scheme)
     assert scheme.fast is not None
-    given, shape = {} if out is None else out, evaluate_shape(mesh)
+    given, shape = checked_out(out), evaluate_shape(mesh)
     full = {name: shape + one for name, one in answers.shapes(scheme, (*wanted, *given)).items()}
     results = targets(full, given, {"points": mesh.points}, _KIND)
     if isinstance(mesh, QuadMesh):

@@ -274,9 +274,7 @@ def _continued(stencils: Stencils, layers: int) -> list[_Beyond]:
 
     border = np.flatnonzero(~stencils.closed)
     kept, faces = topology.part_around(stencils.faces, border, stencils.n, REACH)
-    closed = stencils.closed[kept]
-    points, orientable, roundoff = stencils.points[kept], stencils.orientable, stencils.roundoff
-    part = Stencils(points, faces, closed.shape, closed, orientable, roundoff=roundoff)
+    part = stencils.part(kept, faces)
     layer = ghosts(part, _GHOST_DEGREE, layers)
     if layer.quads.size == 0:
         return []
