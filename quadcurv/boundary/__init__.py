@@ -26,7 +26,6 @@ from numpy.typing import NDArray
 
 from quadcurv.boundary.cells import cell_ghosts, cells_at_poles, cells_within, closed_cells
 from quadcurv.boundary.closing import EXTRAPOLATED, FITTED, INTERIOR, OPEN, REACH, closed
-from quadcurv.boundary.mirror import mirrored
 from quadcurv.boundary.poles import parts_at_poles, poles, poles_of_faces, welded, welded_faces
 from quadcurv.boundary.sides import frame, ghost_layer, part_around
 from quadcurv.boundary.strips import ghosts
@@ -55,7 +54,6 @@ __all__ = [
     "frame",
     "ghost_layer",
     "ghosts",
-    "mirrored",
     "one_rings",
     "part_around",
     "parts_at_poles",

@@ -22,6 +22,7 @@ _TURN = 5  # triangles, of which quads are two, around a vertex with points on n
 # Error of points about the mirror images, in edges, or of the mean curvature, in their inverse, from which on
 # there is no surface.
 _DETERMINED = 0.5
+_FREE = 0.5  # how far a mirror image must be from all points, in distances of points from their nearest
 
 
 class Surfaces(NamedTuple):
@@ -71,6 +72,16 @@ class Surfaces(NamedTuple):
             z = kernel.lifted(self.maps, self.coefficients, x)
         local = np.concatenate((x, z[..., None]), axis=2)
         return np.einsum("kax,kja->kjx", self.frames, local) + self.points[:, None]
+
+    def mirrored(self, points: Floats, rings: int) -> Floats:
+        """Points (k, m, 3) of rings, and their mirror images through the vertex where there is room.
+
+        The vertex first; NaN behind.
+        """
+        from quadcurv.kernels import surfaces as kernel
+
+        given = self.around, self.ring, rings, self.frames, self.maps, self.coefficients
+        return np.asarray(kernel.mirrored(points, *given, _FREE))
 
     def of(self, rows: Indices) -> Surfaces:
         """Some of them."""

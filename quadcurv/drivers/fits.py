@@ -21,7 +21,6 @@ from quadcurv.boundary import (
     fitted,
     ghost_layer,
     ghosts,
-    mirrored,
     poles,
     welded,
     wide,
@@ -241,7 +240,7 @@ class MeshNeighbourhoods:
         error = surfaces.noise * surfaces.gain
         if not inside:
             self.at_border(rings)[:, vertices] = error, surfaces.noise
-        points = mirrored(self.stencils, surfaces, rings)
+        points = surfaces.mirrored(self.stencils.points, rings)
         place = np.full(self.stencils.n, -1)
         place[vertices] = np.arange(vertices.size)
         faces = FaceRings(bundles(points), surfaces.frames[:, 2])
