@@ -11,6 +11,7 @@ import pytest
 import quadcurv as qc
 from quadcurv.drivers import chunked, windows
 from quadcurv.io import as_mesh_or_chunks
+from tests.test_poles import opened
 
 NAMES = ("mean_curvature", "mean_curvature_normal", "vertex_normals", "dual_areas")
 WRAPS = list(itertools.product((False, True), repeat=2))
@@ -96,6 +97,20 @@ def test_small_grids_are_as_in_memory(small, shape, boundary):
             continue
         whole = qc.mean_curvature(qc.QuadGrid(x, wrap), "finite_volume", boundary)
         assert equal(whole, qc.mean_curvature(qc.ChunkedGrid(x, wrap), "finite_volume", boundary))
+
+
+@pytest.mark.parametrize("scheme", ["finite_volume", "cotan-6", "angle_defect"])
+@pytest.mark.parametrize("opening", ["half", "by and by", "both ends", "half nearly"])
+@pytest.mark.parametrize("swapped", [False, True])
+def test_skew_cells_past_a_pole_are_those_of_the_whole_grid(monkeypatch, opening, swapped, scheme):
+    """They lie up to seven rows from the side, and other chunks do not see the pole."""
+    monkeypatch.setattr(chunked, "_MOST", 400)
+    monkeypatch.setattr(chunked, "_MOST_SMALL", 400)
+    x = opened(opening, "grid")[0].points
+    x = x.swapaxes(0, 1) if swapped else x
+    verb = qc.gaussian_curvature if scheme == "angle_defect" else qc.mean_curvature
+    whole, blocks = (verb(grid(x), scheme) for grid in (qc.QuadGrid, qc.ChunkedGrid))
+    np.testing.assert_allclose(whole, blocks, rtol=0, atol=1e-9)
 
 
 @pytest.mark.parametrize("wrap", WRAPS)

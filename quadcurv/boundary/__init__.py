@@ -9,7 +9,8 @@ ghosts, close it. With boundary="extrapolate" they come, in this order of prefer
 2. by arc length: the same on cumulative chord lengths, where the spacing is not smooth but the lines are;
 3. from a surface: where strips are rough, too short or not to be traced (triangles, extraordinary vertices,
    re-entrant corners), or where their ghosts do not lie outside, ghosts are read off a polynomial surface
-   fitted at the vertex. So are whole rings at the poles of a grid, sides that are one point, and beside them.
+   fitted at the vertex. So are whole rings at poles, sides of a mesh or parts of them that are one point but
+   for rounding or 3 % of a cell, tips of narrow triangles too, beside them, and on the skew faces past them.
 
 Where a strip is neither clearly smooth nor clearly rough the way of the least estimated error is taken.
 Open stay, and have no curvature: isolated vertices, those of several fans of faces or of an edge of more
@@ -25,7 +26,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from quadcurv.boundary.cells import cell_ghosts, cells_at_poles, cells_within, closed_cells
-from quadcurv.boundary.closing import EXTRAPOLATED, FITTED, INTERIOR, OPEN, REACH, closed
+from quadcurv.boundary.closing import EXTRAPOLATED, FITTED, INTERIOR, OPEN, REACH, SPREAD, closed
 from quadcurv.boundary.poles import parts_at_poles, poles, poles_of_faces, welded, welded_faces
 from quadcurv.boundary.sides import frame, ghost_layer, part_around
 from quadcurv.boundary.strips import ghosts
@@ -42,6 +43,7 @@ __all__ = [
     "INTERIOR",
     "OPEN",
     "REACH",
+    "SPREAD",
     "Surfaces",
     "boundary_treatment",
     "cell_ghosts",

@@ -10,14 +10,14 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from quadcurv.boundary.closing import EXTRAPOLATED, FITTED, INTERIOR, OPEN, with_stars
+from quadcurv.boundary.closing import EXTRAPOLATED, FITTED, INTERIOR, OPEN, SPREAD, skew, with_stars
 from quadcurv.boundary.poles import poles
 from quadcurv.boundary.sides import continued_sides
 from quadcurv.boundary.stars import regular_stars
 from quadcurv.boundary.surface import fitted
 from quadcurv.mesh import StaggeredGrid
 from quadcurv.stencils import Stencils
-from quadcurv.types import Floats, Indices
+from quadcurv.types import Bools, Floats, Indices
 
 
 def closed_cells(grid: StaggeredGrid, beyond: Floats | None = None) -> tuple[Stencils, NDArray[np.uint8]]:
@@ -54,8 +54,8 @@ def cells_within(grid: StaggeredGrid, centres: Floats) -> Stencils:
 
 
 def cells_at_poles(grid: StaggeredGrid) -> Indices:
-    """Cells, flat, with a side that is one point, and those beyond them, which are as narrow."""
-    pole = poles(grid)
+    """Cells, flat, with a side that is one point, those beyond them, as narrow, and beside skew ones."""
+    pole, x = poles(grid), grid.dual
     if pole is None:
         return np.empty(0, np.int64)
     beside = np.zeros(grid.shape, bool)
@@ -64,7 +64,16 @@ def cells_at_poles(grid: StaggeredGrid) -> Indices:
         for end, rows in ((0, [0, 1]), (-1, [-1, -2])):
             one = (corners[end][1:] >= 0) & (corners[end][1:] == corners[end][:-1])
             cells[rows[: len(cells)]] |= one
+    skewed = skew(np.stack([x[:-1, :-1], x[1:, :-1], x[1:, 1:], x[:-1, 1:]], axis=2))
+    for _ in range(SPREAD):
+        beside |= skewed & _with_neighbours(beside)
+    beside |= _with_neighbours(beside & skewed)
     return np.flatnonzero(beside)
+
+
+def _with_neighbours(cells: Bools) -> Bools:
+    around = np.lib.stride_tricks.sliding_window_view(np.pad(cells, 1), (3, 3))
+    return np.asarray(around.any(axis=(2, 3)))
 
 
 @np.errstate(all="ignore")

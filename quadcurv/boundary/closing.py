@@ -16,6 +16,8 @@ from quadcurv.types import Bools, Floats, Indices, Ints
 
 OPEN, INTERIOR, EXTRAPOLATED, FITTED = 0, 1, 2, 3
 REACH = NODES - 1  # faces from the border inward that closing it looks at
+SPREAD = 6  # faces from a pole within which others as skew are looked for
+_SKEW = 0.35  # sine of an angle
 
 
 @np.errstate(all="ignore")  # what overflows, or has no length, is NaN and has no ghosts
@@ -30,7 +32,7 @@ def closed(given: Stencils, pole: Indices | None = None) -> tuple[Stencils, NDAr
     treatment = np.where(given.closed, INTERIOR, OPEN).astype(np.uint8)
     border = np.flatnonzero(~given.closed)
     if pole is not None:
-        border = np.union1d(border, _beside(given.faces, np.unique(pole[pole >= 0])))
+        border = np.union1d(border, beside_poles(given.points, given.faces, np.unique(pole[pole >= 0])))
     if border.size == 0:
         return given, treatment
     vertices, faces = topology.part_around(given.faces, border, given.n, REACH)
@@ -122,19 +124,48 @@ def _stars(part: Stencils, layer: Ghosts) -> list[tuple[Indices, Stars]]:
 
 def _stars_at_poles(part: Stencils, layer: Ghosts, pole: Indices) -> list[tuple[Indices, Stars]]:
     """As `_stars`; of poles and the vertices beside them regular ones, in place of their narrow triangles."""
+    from quadcurv.kernels import topology
+
     poles = np.unique(pole[pole >= 0])
-    beside = _beside(part.faces, poles)
+    beside = beside_poles(part.points, part.faces, poles)
     layer.error[beside], layer.smooth[beside] = np.inf, True
     found = _stars(part, layer)
     rows = np.union1d(beside, np.flatnonzero(pole >= 0))
     fit_at = np.where(pole[rows] >= 0, pole[rows], rows)
     at, own = np.unique(fit_at, return_inverse=True)
     surfaces = fitted(part, at)
-    known = np.isfinite(surfaces.error[own])
+    indptr, corners = topology.corners_by_vertex(part.faces, len(part.points))
+    kind = topology.order_rings(part.faces, indptr, corners, at)[0][at]
+    known = np.isfinite(surfaces.error) & (kind != topology.SEVERAL_FANS)
+    known = known[own]
     return [*found, (rows[known], regular_stars(part, surfaces.of(own[known])))]
 
 
-def _beside(faces: Ints, poles: Indices) -> Indices:
-    """Vertices of the faces at poles, these too."""
-    near = np.unique(faces[np.isin(faces, poles).any(axis=1)])
-    return near[near >= 0].astype(np.int64)
+def beside_poles(points: Floats, faces: Ints, poles: Indices) -> Indices:
+    """Vertices of the faces at poles, these too, and of those beyond that are as skew.
+
+    Past the end of a pole on a part of a side rows and columns run along each other.
+    """
+    at = np.zeros(len(points) + 1, bool)  # the last one is read by the -1 of triangles
+    at[poles] = True
+    spread = np.ones(len(faces), bool)
+    for step in range(SPREAD):
+        near = faces[spread & at[faces].any(axis=1)]
+        at[near] = True
+        at[-1] = False
+        if step == 0:
+            spread = skew(points[faces]) & (faces[:, 3] >= 0)
+    return np.flatnonzero(at[:-1])
+
+
+def skew(corners: Floats) -> Bools:
+    """Whether two edges of quads (..., 4, 3) run along each other."""
+    ahead = np.roll(corners, -1, axis=-2) - corners
+    behind = np.roll(ahead, 1, axis=-2)
+    return np.asarray(narrow(ahead, behind).any(axis=-1))
+
+
+def narrow(a: Floats, b: Floats) -> Bools:
+    """Whether vectors (..., 3) run along each other, or against."""
+    lengths = np.linalg.norm(a, axis=-1) * np.linalg.norm(b, axis=-1)
+    return np.asarray(np.linalg.norm(np.cross(a, b), axis=-1) < _SKEW * lengths)

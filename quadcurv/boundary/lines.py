@@ -20,6 +20,8 @@ NODES, LEAST = 6, 4  # points of a line; how many there must be
 # does, or this part of what the one before does (the last but one does nothing where a line is odd); along
 # the normal, where noise of the surface shows, but for this part of all that the last but one does.
 SMOOTH, EARLIER, HIDDEN = 0.15, 0.002, 0.002
+# How far apart the ghosts of two lines are, along what their ends are: less means that they cross.
+OPEN = 0.2
 ROUNDING = 2.0**-95  # of coordinates, squared, as extrapolation magnifies it
 # Fourth-order schemes ask for more: the last point changes no more than this, squared, of what the changes of
 # the two points before it, as a geometric series, lead to expect.
@@ -109,7 +111,16 @@ def extended(lines: Floats, turn: Floats, degree: int, layers: int, beside: Indi
         by_index = even | (~smooth & (_SHIFTED * error <= other))
         ghosts = np.where(by_index[:, None, None], ghosts, by_length)
         error = np.where(by_index, error, other)
-    return Continued(lines[:, :1] + ghosts * size[:, None], error * size[:, 0], even | smooth, by_index)
+    ghosts, error, smooth = lines[:, :1] + ghosts * size[:, None], error * size[:, 0], even | smooth
+    crossed = beside[_crossed(lines[:, 0], ghosts[:, 0], beside)].ravel()
+    error[crossed], smooth[crossed] = np.inf, False
+    return Continued(ghosts, error, smooth, by_index)
+
+
+def _crossed(ends: Floats, ghosts: Floats, beside: Indices) -> Bools:
+    """Pairs of lines that meet before their ghosts: towards a hole narrower than a cell, or a tip."""
+    along, beyond = (x[beside[:, 1]] - x[beside[:, 0]] for x in (ends, ghosts))
+    return ~(_dot(along, beyond) > OPEN * _dot(along, along))
 
 
 def continued(lines: Floats, layers: int, even: Bools) -> Floats:

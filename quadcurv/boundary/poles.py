@@ -1,7 +1,7 @@
-"""Sides of a grid, or parts of them, that are one point but for rounding: poles of a sphere, tips of patches.
+"""Sides of a mesh, or parts of them, that are one point or nearly: poles of a sphere, tips of patches.
 
-Quads beside them are triangles, many and narrow, on which most schemes are far off or have no value. Both the
-pole and the row beside it get their rings from fitted surfaces instead, without these triangles.
+Quads beside them are triangles, many and narrow, and past the end of a pole skew, on which most schemes are
+far off or have no value. Both the pole and what is beside it get their rings from fitted surfaces instead.
 """
 
 from __future__ import annotations
@@ -11,12 +11,15 @@ from dataclasses import replace
 import numpy as np
 import scipy
 
-from quadcurv.boundary.closing import REACH
+from quadcurv.boundary.closing import REACH, SPREAD, beside_poles, narrow
 from quadcurv.mesh import QuadGrid, StaggeredGrid
 from quadcurv.stencils import Stencils, grid_faces
 from quadcurv.types import Bools, Floats, Indices, Ints
 
-_POINT = 1e-9  # distance of such points, in distances to the next row
+# Distance of such points from each other, in distances to the next row, and in those of the points there. A
+# side not as short as that is narrow, no more, and of one much shorter the surface is known at one point.
+_POINT, _FAN = 0.03, 0.25
+_STEPS = 10.0 ** np.arange(0, -8, -1)  # how much nearer than that they are sought: others may be near, too
 _LEAST = 3  # of such points: a quad with two corners at one place is no pole
 
 
@@ -29,71 +32,83 @@ def poles(grid: QuadGrid | StaggeredGrid) -> Indices | None:
 
     if isinstance(grid, QuadGrid) and grid.mask is not None:
         return None
-    points, apart = grid.points if isinstance(grid, QuadGrid) else grid.dual, 4 * _POINT + 32 * grid.roundoff
-    return None if all_apart(points, grid.wrap, apart * apart) else _found(grid, points)
-
-
-@np.errstate(all="ignore")
-def _found(grid: QuadGrid | StaggeredGrid, points: Floats) -> Indices | None:
-    found = None
+    points = grid.points if isinstance(grid, QuadGrid) else grid.dual
+    if all_apart(points, grid.wrap, 2 * _POINT, 32 * grid.roundoff):
+        return None
+    number = np.arange(points[..., 0].size).reshape(points.shape[:2])
+    sides = []
     for axis in (0, 1):
         if grid.wrap[axis]:
             continue
-        rows = np.moveaxis(points, axis, 0)
-        for end in (0, -1):
-            side, beside = rows[end], rows[1 if end == 0 else -2]
-            step = np.linalg.norm(beside - side, axis=1)
-            most = _POINT * step + 16 * grid.roundoff * np.abs(side).max()
-            one = (np.abs(side - np.roll(side, -1, axis=0)).max(axis=1) <= most) & (most < 1e-3 * step)
-            if not (grid.wrap[1 - axis] and isinstance(grid, QuadGrid)):
-                one[-1] = False
-            number = np.moveaxis(np.arange(points[..., 0].size).reshape(points.shape[:2]), axis, 0)[end]
-            if one.any() and (pole := _of_runs(one, number)).max() >= 0:
-                found = np.full(points.shape[:2], -1) if found is None else found
-                of_side = np.moveaxis(found, axis, 0)[end]
-                of_side[pole >= 0] = pole[pole >= 0]
-    return found
+        rows = np.moveaxis(number, axis, 0)
+        for end, beside in ((0, 1), (-1, -2)):
+            side = np.stack((rows[end], np.roll(rows[end], -1), rows[beside], np.roll(rows[beside], -1)))
+            sides.append(side if grid.wrap[1 - axis] and isinstance(grid, QuadGrid) else side[:, :-1])
+    a, b, beside_a, beside_b = np.concatenate(sides, axis=1)
+    found = _at_one_place(points.reshape(-1, 3), a, b, beside_a, beside_b, grid.roundoff)
+    return None if found is None else found.reshape(number.shape)
 
 
-def _of_runs(one: Bools, number: Indices) -> Indices:
-    """The first number of each run of points that are one with the next, -1 for others."""
-    size = one.size
-    begin = 0 if one.all() else int(np.argmin(one)) + 1  # of a run, even across a seam
-    order = (begin + np.arange(size)) % size
-    goes_on = np.concatenate(([False], one[order][:-1]))
-    run = np.cumsum(~goes_on) - 1
-    first = number[order][~goes_on][run]
-    pole = np.empty(size, np.int64)
-    pole[order] = np.where(np.bincount(run)[run] >= _LEAST, first, -1)
-    return pole
+@np.errstate(all="ignore")
+def _at_one_place(
+    points: Floats, a: Indices, b: Indices, beside_a: Indices, beside_b: Indices, roundoff: float
+) -> Indices | None:
+    """Vertices at one place, joined by edges (a, b) of the border: (n,), the first one of each, else -1.
+
+    `beside_a` and `beside_b` are the vertices inward from each edge.
+    """
+    edge = np.abs(points[b] - points[a]).max(axis=1)
+    step = np.linalg.norm(points[beside_a] - points[a], axis=1)
+    rounding = 16 * roundoff * np.abs(points[a]).max(axis=1)
+    found = np.full(len(points), -1)
+    for nearer in _STEPS:
+        one = (edge <= nearer * _POINT * step + rounding) & (rounding < 1e-3 * step)
+        one &= (found[a] < 0) & (found[b] < 0)
+        if not one.any():
+            break
+        u, v = a[one], b[one]
+        graph = scipy.sparse.coo_array((np.ones(u.size, bool), (u, v)), (found.size, found.size))
+        _, of = scipy.sparse.csgraph.connected_components(graph, directed=False)
+        _, first, number = np.unique(of, return_index=True, return_counts=True)
+        # How far apart they are, how far those beside them, and the least distance between.
+        size, fan, rounded = np.zeros((3, number.size))
+        inward = np.full(number.size, np.inf)
+        begin = np.full(number.size, -1)
+        begin[of[u[::-1]]] = beside_a[one][::-1]
+        for ends, other in ((u, beside_a[one]), (v, beside_b[one])):
+            np.maximum.at(size, of[u], np.linalg.norm(points[ends] - points[first[of[u]]], axis=1))
+            np.maximum.at(fan, of[u], np.linalg.norm(points[other] - points[begin[of[u]]], axis=1))
+            np.minimum.at(inward, of[u], np.linalg.norm(points[other] - points[ends], axis=1))
+        np.maximum.at(rounded, of[u], rounding[one])
+        near = (
+            (number >= _LEAST) & (size <= _POINT * inward + 2 * rounded) & (size <= _FAN * fan + 2 * rounded)
+        )
+        found[near[of]] = first[of[near[of]]]
+    return found if found.max(initial=-1) >= 0 else None
 
 
 @np.errstate(all="ignore")
 def poles_of_faces(stencils: Stencils) -> Indices | None:
     """Border vertices of a face list at a pole: (n,), the first one there, else -1; None if none is.
 
-    Those are joined by edges of no length, at least three of them.
+    One vertex is a pole of its own if several triangles are narrow there.
     """
-    faces, points, n = stencils.faces, stencils.points, stencils.n
+    faces, n = stencils.faces, stencils.n
     if stencils.polygons is not None or stencils.closed.all():
         return None
-    border = np.append(~stencils.closed, np.zeros(len(points) - n + 1, bool))
-    faces = faces[np.count_nonzero(border[faces], axis=1) > 1]
-    following = np.roll(faces, -1, axis=1)
-    following = np.where(following < 0, faces[:, :1], following)
-    row, slot = np.nonzero(border[faces] & border[following] & (faces >= 0))
-    a, b = faces[row, slot], following[row, slot]
-    size = np.abs(points[faces[row]] - points[a][:, None]).max(axis=2)
-    size = np.where(faces[row] >= 0, size, 0.0).max(axis=1)
-    most = _POINT * size + 16 * stencils.roundoff * np.abs(points[a]).max(axis=1)
-    one = (np.abs(points[a] - points[b]).max(axis=1) <= most) & (most < 1e-3 * size)
-    if not one.any():
-        return None
-    graph = scipy.sparse.coo_array((np.ones(one.sum(), bool), (a[one], b[one])), (n, n))
-    _, of = scipy.sparse.csgraph.connected_components(graph, directed=False)
-    _, first = np.unique(of, return_index=True)
-    many = np.bincount(of)[of] >= _LEAST
-    return np.where(many, first[of], -1) if many.any() else None
+    border = np.append(~stencils.closed, np.zeros(len(stencils.points) - n + 1, bool))
+    faces = faces[border[faces].any(axis=1)]
+    sides = np.where(faces[:, 3] < 0, 3, 4)
+    row, slot = np.nonzero((faces >= 0) & border[faces])
+    before, b, after = (faces[row, (slot + k) % sides[row]] for k in (-1, 1, 2))
+    a, kept, x = faces[row, slot], border[b], stencils.points[:n]
+    found = _at_one_place(x, a[kept], b[kept], before[kept], after[kept], stencils.roundoff)
+    tip = (faces[row, 3] < 0) & narrow(x[b] - x[a], x[before] - x[a])
+    tips = np.flatnonzero(np.bincount(a[tip], minlength=n) >= _LEAST)
+    if tips.size:
+        found = np.full(n, -1) if found is None else found
+        found[tips] = np.where(found[tips] < 0, tips, found[tips])
+    return found
 
 
 def welded_faces(stencils: Stencils, pole: Indices) -> Stencils:
@@ -111,9 +126,11 @@ def welded_faces(stencils: Stencils, pole: Indices) -> Stencils:
 def welded(grid: QuadGrid, pole: Indices) -> tuple[Stencils, Indices]:
     """Stencils with one vertex and triangles at each pole; that vertex for each point of a pole, else -1."""
     vertex = np.where(pole >= 0, pole, np.arange(pole.size).reshape(pole.shape)).astype(np.int32)
-    faces = grid_faces(np.pad(vertex, [(0, int(w)) for w in grid.wrap], mode="wrap"))
-    given = grid.stencils()
-    return replace(given, faces=_without_repetition(faces)), pole.ravel()
+    return replace(grid.stencils(), faces=_without_repetition(_grid_faces(vertex, grid.wrap))), pole.ravel()
+
+
+def _grid_faces(vertex: Ints, wrap: tuple[bool, bool]) -> Ints:
+    return grid_faces(np.pad(vertex, [(0, int(w)) for w in wrap], mode="wrap"))
 
 
 def parts_at_poles(grid: QuadGrid) -> list[tuple[Indices, QuadGrid, Bools]]:
@@ -129,16 +146,21 @@ def parts_at_poles(grid: QuadGrid) -> list[tuple[Indices, QuadGrid, Bools]]:
             at = (side >= 0) & ((side == np.roll(side, 1)) | (side == np.roll(side, -1)))
             if grid.wrap[axis] or not at.any():  # a pole's end is a corner of another side
                 continue
-            size = min(REACH + 3, grid.shape[axis])
+            size = min(REACH + SPREAD + 3, grid.shape[axis])
             rows = slice(0, size) if end == 0 else slice(grid.shape[axis] - size, None)
             cut = (rows, slice(None)) if axis == 0 else (slice(None), rows)
-            beside = np.zeros(number[cut].shape, bool)
-            around = np.pad(at, 1, mode="wrap" if grid.wrap[1 - axis] else "constant")
-            of_side = around[:-2] | around[1:-1] | around[2:]
-            np.moveaxis(beside, axis, 0)[[0, 1] if end == 0 else [-1, -2]] = of_side
             wrap = [w and i != axis for i, w in enumerate(grid.wrap)]
             part = QuadGrid(grid.points[cut], wrap).with_roundoff(grid.roundoff)
-            near.append((number[cut].ravel(), part, beside.ravel()))
+            place = np.arange(part.points[..., 0].size).reshape(part.shape)
+            own = np.moveaxis(place, axis, 0)[end]
+            vertex = place.astype(np.int32)
+            for first in np.unique(side[at]):
+                np.moveaxis(vertex, axis, 0)[end][side == first] = own[side == first][0]
+            faces = _without_repetition(_grid_faces(vertex, part.wrap))
+            beside = np.zeros(place.size, bool)
+            beside[beside_poles(part.points.reshape(-1, 3), faces, np.unique(vertex[place != vertex]))] = True
+            beside[own[at]] = True
+            near.append((number[cut].ravel(), part, beside))
     return near
 
 

@@ -8,6 +8,7 @@ import scipy
 from quadcurv.boundary.lines import (
     EARLIER,
     HIDDEN,
+    OPEN,
     ROUNDING,
     SMOOTH,
     index_weights,
@@ -101,7 +102,7 @@ def continued_sides(points: Floats, wrap: tuple[bool, bool]) -> tuple[Frame, dic
     from quadcurv.kernels import border
 
     r, c, _ = points.shape
-    beyond, beside, excess = border.continue_sides(points, wrap, (SMOOTH, EARLIER, HIDDEN, ROUNDING))
+    beyond, beside, excess = border.continue_sides(points, wrap, (SMOOTH, EARLIER, HIDDEN, ROUNDING, OPEN))
     uneven = {}
     if excess.max() > 0:
         with np.errstate(invalid="ignore"):

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from quadcurv.boundary import REACH, checked_boundary, closed, poles
+from quadcurv.boundary import REACH, SPREAD, checked_boundary, closed, poles
 from quadcurv.device_arrays import as_cupy, is_on_device, on_host, taken
 from quadcurv.drivers import answers, compiled, direct
 from quadcurv.drivers.targets import Kind, checked_out, targets
@@ -23,8 +23,8 @@ from quadcurv.types import Floats
 
 _THREADS = 64
 # Rows along a side that are copied, and those of them whose results are taken: that of the side and, where it
-# is a pole, the one beside it. Closing rings looks REACH quads inward.
-_COPIED, _TAKEN = REACH + 5, 2
+# is a pole, those beside it. Closing rings looks REACH quads inward.
+_COPIED, _TAKEN = REACH + SPREAD + 5, SPREAD + 2
 
 
 def holds(mesh: Any) -> bool:

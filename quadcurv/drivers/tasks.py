@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from quadcurv.boundary import one_rings
+from quadcurv.boundary import SPREAD, one_rings
 from quadcurv.drivers import answers, apply, compiled, fits, has_holes, run
 from quadcurv.drivers.windows import Window
 from quadcurv.mesh import QuadGrid, StaggeredGrid
@@ -69,7 +69,7 @@ def laplacian(scheme: Laplacian, wanted: Iterable[str]) -> Task:
             found = run(grid, scheme, names, boundary or "nan")
         _put(window, found, into)
 
-    return Task(names, 1, write, small=scheme.fast is None)
+    return Task(names, 1, write, small=scheme.fast is None, depth=SPREAD + 3)
 
 
 def fit(scheme: Fit, wanted: Iterable[str]) -> Task:
@@ -112,7 +112,7 @@ def angle_defect() -> Task:
             )
         _put(window, found, into)
 
-    return Task({"gaussian_curvature": ()}, 1, write, small=True)
+    return Task({"gaussian_curvature": ()}, 1, write, small=True, depth=SPREAD + 3)
 
 
 def laplace_beltrami(scheme: Laplacian, f: Any) -> Task:

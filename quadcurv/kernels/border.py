@@ -26,7 +26,21 @@ def continued(line):
 
 @formula
 def continue_lines(
-    points, first, along, inward, count, wraps, smooth, earlier, hidden, rounding, ghosts, to, excess, line
+    points,
+    first,
+    along,
+    inward,
+    count,
+    wraps,
+    smooth,
+    earlier,
+    hidden,
+    rounding,
+    open,
+    ghosts,
+    to,
+    excess,
+    line,
 ):
     """A ghost and an excess for each line of a side."""
     far = Carried((0,))
@@ -53,6 +67,15 @@ def continue_lines(
         over = where(up > over, up, over) - rounding
         outside = (dot(ghost, a) < -0.2 * edge) & (dot(ghost, ghost) < 4.0 * edge) & (over == over)
         excess[line + k] = where(outside, over, inf)
+        # Lines that cross the one before.
+        last = where(k > 0, k - 1, k)
+        ends, beyond = (
+            apart(points, at, points, first + along * last, 1),
+            apart(ghosts, to + 3 * k, ghosts, to + 3 * last, 1),
+        )
+        crossed = (k > 0) & (dot(ends, beyond) <= open * dot(ends, ends))
+        for j in (last, k):
+            excess[line + j] = where(crossed, inf, excess[line + j])
 
 
 @formula
@@ -83,7 +106,7 @@ def fill(values, begin, end, x):
 
 
 @kernel
-def _continue(points, r, c, closed, wraps, smooth, earlier, hidden, rounding, ghosts, excess):
+def _continue(points, r, c, closed, wraps, smooth, earlier, hidden, rounding, open, ghosts, excess):
     # Of axis 0 whether it is `closed`, of axis 1 whether it `wraps`.
     fill(ghosts, 0, ghosts.size, nan)
     for k in range(4):
@@ -94,8 +117,8 @@ def _continue(points, r, c, closed, wraps, smooth, earlier, hidden, rounding, gh
         fill(excess, line, line + count, -inf if is_closed else inf)
         if depth >= 6 and not is_closed:
             continue_lines(
-                points, first, along, inward, count, other, smooth, earlier, hidden, rounding, ghosts, to,
-                excess, line,
+                points, first, along, inward, count, other, smooth, earlier, hidden, rounding, open, ghosts,
+                to, excess, line,
             )  # fmt: skip
     for k in range(4 if c > 4 and not wraps and not closed else 0):
         # Lines of ghosts before the first and after the last row.
@@ -112,8 +135,8 @@ def continue_sides(points, wrap, limits):
     points : (r, c, 3) float64
     wrap : (bool, bool)
         Directions that are closed.
-    limits : (float, float, float, float)
-        SMOOTH, EARLIER, HIDDEN and ROUNDING of quadcurv.boundary.lines.
+    limits : (float, float, float, float, float)
+        SMOOTH, EARLIER, HIDDEN, ROUNDING and OPEN of quadcurv.boundary.lines.
 
     Returns
     -------
@@ -124,7 +147,8 @@ def continue_sides(points, wrap, limits):
         these are closed. NaN as of lines of fewer than six points, at corners five.
     excess : (2 c + 2 r,) float64
         Line by line in the same order: the square of what the sixth point changes, less the most that it
-        may; infinite where the ghost does not lie outside, -infinite where there are no lines.
+        may; infinite where the ghost does not lie outside, or its line crosses the next one, -infinite where
+        there are no lines.
     """
     r, c, _ = points.shape
     excess, ghosts = np.empty(2 * (r + c)), np.empty(6 * c + (0 if wrap[1] else 6 * (r + 2)))
@@ -138,37 +162,40 @@ def continue_sides(points, wrap, limits):
 
 
 @formula
-def crowded(points, first, along, inward, count, wraps, tolerance):
-    """Whether a point of a side is, but for `tolerance`, that of the next one: 1 or 0."""
-    found = Carried((MOST, 0))
+def crowded(points, first, along, inward, count, wraps, short, rounding):
+    """Whether a point of a side is, but for rounding or a short way inward, that of the next one: 1 or 0."""
+    found = Carried((MOST, 0, 0))
     for k in span(0, count):
         at = first + along * k
         x, y = triple(points, at, 1), triple(points, at + inward, 1)
         step = less(
             triple(points, where(k < count - 1, at + along, where(wraps > 0, first, at - along)), 1), x
         )
-        near, far = found.get()
+        near, far, number = found.get()
         far = larger(larger(far, bits(dot(x, x))), bits(dot(y, y)))
-        found.set((smaller(near, bits(dot(step, step))), far))
-    near, far = (from_bits(x) for x in found.get())
-    return where(near > tolerance * far, 0, 1)
+        edge, across = dot(step, step), less(y, x)
+        number = number + where(edge > short * dot(across, across), 0, 1)
+        found.set((smaller(near, bits(edge)), far, number))
+    near, far, number = found.get()
+    return where((from_bits(near) > rounding * from_bits(far)) & (number == 0), 0, 1)
 
 
 @kernel
-def _crowded(points, r, c, closed, wraps, tolerance):
+def _crowded(points, r, c, closed, wraps, short, rounding):
     number = 0
     for k in range(4):
         is_closed, other = (wraps, closed) if k > 1 else (closed, wraps)
         if not is_closed:
             first, along, inward, count = side(r, c, k >> 1, k & 1)
-            number += crowded(points, first, along, inward, count, other, tolerance)
+            number += crowded(points, first, along, inward, count, other, short, rounding)
     return number
 
 
-def all_apart(points, wrap, tolerance):
+def all_apart(points, wrap, short, rounding):
     """Whether no point (r, c, 3) of an open side of a grid is that of the next one.
 
-    `tolerance` is the least square of their distance, in squares of the coordinates there.
+    They are where they are as near as `short`, in distances to the next row, or as `rounding`, in
+    coordinates there.
     """
     r, c, _ = points.shape
-    return _crowded(flat(points), r, c, int(wrap[0]), int(wrap[1]), tolerance) == 0
+    return _crowded(flat(points), r, c, int(wrap[0]), int(wrap[1]), short**2, rounding**2) == 0
