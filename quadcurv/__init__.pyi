@@ -44,6 +44,7 @@ from .schemes import SCHEMES as SCHEMES
 from .schemes import Curvatures as Curvatures
 from .schemes import Fit as Fit
 from .schemes import Laplacian as Laplacian
+from .types import ConsistencyWarning as ConsistencyWarning
 from .types import MeshError as MeshError
 from .types import MeshWarning as MeshWarning
 from .types import PrecisionWarning as PrecisionWarning

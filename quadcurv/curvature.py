@@ -164,6 +164,8 @@ def mean_curvature(
     -----
     MeshWarning
         The mesh was mended; see ``mesh.report``.
+    ConsistencyWarning
+        Faces are too skew for a Laplacian, and where.
     PrecisionWarning
         The rounding of the positions reaches a hundredth of H.
 

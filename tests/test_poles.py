@@ -180,6 +180,7 @@ def partly_one_point(part):
     return np.stack((x, y, 0.3 * x * x + 0.2 * y * y), axis=-1)
 
 
+@pytest.mark.filterwarnings("ignore::quadcurv.ConsistencyWarning")
 @pytest.mark.parametrize("scheme", ALL)
 @pytest.mark.parametrize("boundary", ["extrapolate", "nan"])
 @pytest.mark.parametrize("shape", ["ball", "part", "octant"])
@@ -276,6 +277,7 @@ def opened(opening, given_as):
     return mesh, H.ravel(), K.ravel()
 
 
+@pytest.mark.filterwarnings("ignore::quadcurv.ConsistencyWarning")
 @pytest.mark.parametrize("given_as", ["grid", "faces", "triangles", "cells"])
 @pytest.mark.parametrize("opening", OPENINGS)
 def test_sides_that_are_collapsed_in_part_or_nearly(opening, given_as):
@@ -288,7 +290,7 @@ def test_sides_that_are_collapsed_in_part_or_nearly(opening, given_as):
         assert np.isnan(off).sum() == two_fans
         off[np.isnan(off)] = 0.0
         assert off[treatment == FITTED].max(initial=0) < (0.6 if scheme in DIVERGENT else 0.3)
-        # Cells past these are as skew as 20 degrees.
+        # Cells past these are as skew as 20 degrees: of those schemes that are off by more it is told.
         assert off.max() < (15 if scheme in DIVERGENT else 0.6 if opening == "by and by" else 0.5)
         if scheme in ("finite_volume", "liu", "bunge", "jet"):
             assert off.max() < 0.1

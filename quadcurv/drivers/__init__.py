@@ -44,26 +44,43 @@ def run(
     wanted: Iterable[str],
     boundary: str = "extrapolate",
     out: Mapping[str, Floats] | None = None,
+    tell: bool = False,
 ) -> dict[str, Floats]:
-    """Results by name (see `direct.PER_VERTEX`), into the arrays of `out` where there are any."""
+    """Results by name (see `direct.PER_VERTEX`), into the arrays of `out` where there are any.
+
+    Where H may be far off for the rings of faces alone a warning says so if it is to `tell`.
+    """
     if device.holds(mesh):
         return device.evaluate(mesh, scheme, wanted, boundary, out)  # type: ignore[arg-type]
     checked_boundary(boundary)
     results = arrays(mesh, scheme, wanted, out)
-    if isinstance(mesh, GridBlocks):
-        blocks.evaluate(mesh, scheme, boundary, results)
-    elif has_holes(mesh):
-        for name, values in run(mesh.to_mesh(), scheme, results, boundary).items():
-            results[name][...] = mesh.in_shape(values)
-    elif scheme.fast is None:
-        direct.evaluate(mesh.stencils(), one_rings(mesh, boundary), scheme, results)
-    elif isinstance(mesh, QuadMesh):
-        compiled.evaluate_faces(mesh, scheme, boundary, results)
-    else:
-        compiled.evaluate_grid(mesh, scheme, boundary, results)
+    far = _evaluate(mesh, scheme, boundary, results)
+    if tell and far.vertices.size:
+        far.warn(scheme, mesh.shape if isinstance(mesh, QuadGrid) else mesh.stencils().shape)
     if _of_cells(mesh) and "dual_areas" in results:
         results["dual_areas"] *= _CELLS
     return results
+
+
+def _evaluate(
+    mesh: Mesh | GridBlocks, scheme: Laplacian, boundary: str, results: dict[str, Floats]
+) -> direct.FarOff:
+    """Write results; where H may be far off."""
+    if isinstance(mesh, GridBlocks):
+        blocks.evaluate(mesh, scheme, boundary, results)
+        return direct.NOWHERE
+    if has_holes(mesh):
+        inner, known = mesh.to_mesh(), np.flatnonzero(~np.asarray(mesh.mask))
+        found = arrays(inner, scheme, results)
+        far = _evaluate(inner, scheme, boundary, found)
+        for name, values in found.items():
+            results[name][...] = mesh.in_shape(values)
+        return far._replace(vertices=known[far.vertices])
+    if scheme.fast is None:
+        return direct.evaluate(mesh.stencils(), one_rings(mesh, boundary), scheme, results)
+    if isinstance(mesh, QuadMesh):
+        return compiled.evaluate_faces(mesh, scheme, boundary, results)
+    return compiled.evaluate_grid(mesh, scheme, boundary, results)
 
 
 def stiffness(

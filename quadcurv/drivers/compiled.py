@@ -36,54 +36,66 @@ _NOTHING = np.empty(0)  # a result that nobody wants
 _CLOSED = Frame(_NOTHING, _NOTHING)  # what is beyond a grid is its other side
 
 
-def evaluate_faces(mesh: QuadMesh, scheme: Laplacian, boundary: str, results: Mapping[str, Floats]) -> None:
-    """Regular vertices in one pass, the others from the stencils of the part of the mesh around them."""
+def evaluate_faces(
+    mesh: QuadMesh, scheme: Laplacian, boundary: str, results: Mapping[str, Floats]
+) -> direct.FarOff:
+    """Regular vertices in one pass, the others from the stencils of the part of the mesh around them.
+
+    Of those others, where H may be far off.
+    """
     assert scheme.fast is not None
     others, part = mesh.irregular_part()
     if others.size and poles_of_faces(part) is not None:  # rare: all of it the slow way
-        direct.evaluate(mesh.stencils(), one_rings(mesh, boundary), scheme, results)
-        return
+        return direct.evaluate(mesh.stencils(), one_rings(mesh, boundary), scheme, results)
     _evaluate_rings(mesh, scheme.fast, results)
+    far = direct.NOWHERE
     if others.size:
         inner = {name: np.empty(part.shape + direct.PER_VERTEX[name]) for name in results}
         treated = closed(part)[0] if boundary == "extrapolate" else part
-        direct.evaluate(part, treated, scheme, inner)
+        found = direct.evaluate(part, treated, scheme, inner).of(np.arange(others.size), part.n)
+        far = found._replace(vertices=others[found.vertices])
         for name, values in inner.items():
             results[name][others] = values[: others.size]
     if not mesh.orientable and "mean_curvature" in results:
         np.abs(results["mean_curvature"], out=results["mean_curvature"])
+    return far
 
 
 def evaluate_grid(
     grid: QuadGrid | StaggeredGrid, scheme: Laplacian, boundary: str, results: Mapping[str, Floats]
-) -> None:
-    """All in one pass, save along open sides: what is cut off there, and rings that ghosts by index miss."""
+) -> direct.FarOff:
+    """All in one pass, save along open sides: what is cut off there, and rings that ghosts by index miss.
+
+    Of those, where H may be far off.
+    """
     assert scheme.fast is not None
     unserved = evaluate_rows(grid, scheme.fast, boundary, results)
     if all(grid.wrap) or (isinstance(grid, StaggeredGrid) and grid.has_ghosts):
-        return
+        return direct.NOWHERE
+    found = []
     if isinstance(grid, QuadGrid):
         for vertices, part, beside in parts_at_poles(grid):
             treated, rows = one_rings(part, boundary), np.flatnonzero(beside)
-            _fill(results, vertices[rows], part.stencils(), treated, scheme, rows)
+            found.append(_fill(results, vertices[rows], part.stencils(), treated, scheme, rows))
             unserved = np.setdiff1d(unserved, vertices[rows])
     if unserved.size:
-        _evaluate_part(grid, unserved, scheme, results)
+        found.append(_evaluate_part(grid, unserved, scheme, results))
     cut = {"dual_areas"} if boundary == "extrapolate" else {"dual_areas", "vertex_normals"}
     if cut & results.keys():
         _evaluate_sides(grid, scheme, {name: results[name] for name in cut & results.keys()})
+    return direct.FarOff._make(map(np.concatenate, zip(direct.NOWHERE, *found, strict=True)))
 
 
 def _evaluate_part(
     grid: QuadGrid | StaggeredGrid, others: Indices, scheme: Laplacian, results: Mapping[str, Floats]
-) -> None:
+) -> direct.FarOff:
     """Vertices that the frame of a grid does not serve, from the stencils of a part around them."""
     if isinstance(grid, QuadGrid):
         given, place = part_around(grid, others, REACH)[1], np.arange(others.size)
         treated = closed(given)[0]
     else:
         given, place, treated = grid.stencils(), others, one_rings(grid)
-    _fill(results, others, given, treated, scheme, place)
+    return _fill(results, others, given, treated, scheme, place)
 
 
 def _fill(
@@ -93,13 +105,14 @@ def _fill(
     treated: Stencils,
     scheme: Laplacian,
     place: Indices,
-) -> None:
+) -> direct.FarOff:
     """Give some vertices of a grid the results at some places in other stencils."""
     inner = {name: np.empty(given.shape + direct.PER_VERTEX[name]) for name in results}
-    direct.evaluate(given, treated, scheme, inner)
+    far = direct.evaluate(given, treated, scheme, inner).of(place, given.n)
     for name, values in inner.items():
         rows = (-1, *direct.PER_VERTEX[name])
         results[name].reshape(rows)[vertices] = values.reshape(rows)[place]
+    return far._replace(vertices=vertices[far.vertices])
 
 
 def _evaluate_sides(grid: QuadGrid | StaggeredGrid, scheme: Laplacian, results: Mapping[str, Floats]) -> None:

@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import NamedTuple
 
 import numpy as np
 import scipy
 
 from quadcurv.schemes import Laplacian
 from quadcurv.schemes.assembly import ring_areas
+from quadcurv.schemes.consistency import far_off
 from quadcurv.stencils import Stencils
-from quadcurv.types import Floats
+from quadcurv.types import ConsistencyWarning, Floats, Indices, warn
 
 PER_VERTEX: dict[str, tuple[int, ...]] = {
     "mean_curvature": (),
@@ -21,23 +23,61 @@ PER_VERTEX: dict[str, tuple[int, ...]] = {
 """What can be asked for, and the shape of one vertex's answer."""
 
 
-def evaluate(given: Stencils, treated: Stencils, scheme: Laplacian, results: Mapping[str, Floats]) -> None:
-    """Write results by name; `treated` has its boundary closed, dual areas are those of `given`."""
+class FarOff(NamedTuple):
+    """Vertices, flat, where H of a scheme may be far off for their rings, and by how much."""
+
+    vertices: Indices
+    off: Floats
+
+    def of(self, place: Indices, n: int) -> FarOff:
+        """Those of some places (k,) among n, as the k."""
+        row = np.full(n, -1)
+        row[place] = np.arange(place.size)
+        at = row[self.vertices]
+        return FarOff(at[at >= 0], self.off[at >= 0])
+
+    def warn(self, scheme: Laplacian, shape: tuple[int, ...]) -> None:
+        """Name the first one, and how many there are.
+
+        Warns
+        -----
+        ConsistencyWarning
+        """
+        if not self.vertices.size:
+            return
+        first = tuple(map(int, np.unravel_index(self.vertices.min(), shape)))
+        warn(
+            f"{scheme.name}: H may be off by up to {self.off.max():.2g} times the larger principal curvature "
+            f"at {self.vertices.size} vertices of faces too skew for it, first vertex "
+            f"{first if len(first) > 1 else first[0]}; 'jet' does not depend on faces",
+            ConsistencyWarning,
+        )
+
+
+NOWHERE = FarOff(np.empty(0, np.int64), np.empty(0))
+
+
+def evaluate(given: Stencils, treated: Stencils, scheme: Laplacian, results: Mapping[str, Floats]) -> FarOff:
+    """Write results by name; `treated` has its boundary closed, dual areas are those of `given`.
+
+    Where H may be far off is found if it is asked for.
+    """
     if "dual_areas" in results:
         results["dual_areas"][...] = flux_and_area(given, scheme)[1].reshape(given.shape)
     if results.keys() <= {"dual_areas"}:
-        return
+        return NOWHERE
     normals = unit_normals(treated, scheme)
     if "vertex_normals" in results:
         results["vertex_normals"][...] = normals.reshape(*treated.shape, 3)
     if results.keys() <= {"dual_areas", "vertex_normals"}:
-        return
+        return NOWHERE
     Hn = mean_curvature_normal(treated, scheme)
     if "mean_curvature_normal" in results:
         results["mean_curvature_normal"][...] = Hn.reshape(*treated.shape, 3)
     if "mean_curvature" in results:
         H = -np.einsum("ix,ix->i", Hn, normals)
         results["mean_curvature"][...] = (H if treated.orientable else np.abs(H)).reshape(treated.shape)
+    return FarOff(*far_off(treated, scheme))
 
 
 def flux_and_area(stencils: Stencils, scheme: Laplacian) -> tuple[Floats, Floats]:

@@ -28,7 +28,7 @@ def results(
     if isinstance(mesh, ChunkedGrid):
         return parts.evaluate(mesh, wanted, scheme, boundary, out, progress)
     if isinstance(scheme, Laplacian):
-        found = drivers.run(mesh, scheme, wanted, boundary, out)
+        found = drivers.run(mesh, scheme, wanted, boundary, out, tell=True)
         if (name := answers.telling(found)) is not None:
             warn_of_rounding(mesh, found[name])
     else:
