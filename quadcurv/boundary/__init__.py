@@ -31,7 +31,7 @@ from quadcurv.boundary.poles import parts_at_poles, poles, poles_of_faces, welde
 from quadcurv.boundary.sides import frame, ghost_layer, part_around
 from quadcurv.boundary.strips import ghosts
 from quadcurv.boundary.strips import roughness as rough_lines
-from quadcurv.boundary.surface import Surfaces, fitted, tangent_frames, wide
+from quadcurv.boundary.surface import Surfaces, Trials, fitted, tangent_frames, trials, wide
 from quadcurv.mesh import Mesh, QuadGrid, QuadMesh, StaggeredGrid
 from quadcurv.stencils import Stencils
 from quadcurv.types import Floats
@@ -45,6 +45,7 @@ __all__ = [
     "REACH",
     "SPREAD",
     "Surfaces",
+    "Trials",
     "boundary_treatment",
     "cell_ghosts",
     "cells_at_poles",
@@ -63,6 +64,7 @@ __all__ = [
     "poles_of_faces",
     "roughness",
     "tangent_frames",
+    "trials",
     "welded",
     "wide",
 ]

@@ -88,20 +88,58 @@ class Surfaces(NamedTuple):
         return Surfaces._make(values[rows] for values in self)
 
 
-def fitted(stencils: Stencils, vertices: Indices) -> Surfaces:
-    """Fit surfaces at vertices (k,) of a face list."""
+class Trials(NamedTuple):
+    """Polynomials of several degrees at vertices, of which `fitted` chooses.
+
+    Attributes
+    ----------
+    around, ring, frames
+        As those of `Surfaces`, ROOM wide.
+    found : (k, fits, RESULTS) float64
+        See `kernels.surfaces.fits`.
+    """
+
+    around: Ints
+    ring: Ints
+    frames: Floats
+    found: Floats
+
+    def of(self, rows: Indices) -> Trials:
+        """Some of them."""
+        return Trials._make(values[rows] for values in self)
+
+    def and_(self, others: Trials) -> Trials:
+        """These and others."""
+        return Trials._make(np.concatenate((self[i], others[i])) for i in range(len(self)))
+
+
+def trials(stencils: Stencils, vertices: Indices, corners: tuple[Indices, Ints] | None = None) -> Trials:
+    """Fit surfaces of all degrees at vertices (k,) of a face list; its `corners` by vertex may be known."""
     from quadcurv.kernels import nearby, topology
     from quadcurv.kernels import surfaces as kernel
 
-    indptr, corners = topology.corners_by_vertex(stencils.faces, len(stencils.points))
-    around, ring = nearby.rings_around(stencils.faces, indptr, corners, vertices, RINGS, ROOM)
+    indptr, of_vertex = corners or topology.corners_by_vertex(stencils.faces, len(stencils.points))
+    around, ring = nearby.rings_around(stencils.faces, indptr, of_vertex, vertices, RINGS, ROOM)
+    near, of = _filled(around, ring)
+    frames = tangent_frames(_normals(stencils, vertices, near, of))
+    given = stencils.points, stencils.ring_areas, stencils.orientable, near, of, frames
+    return Trials(around, ring, frames, kernel.fits(*given, *zip(*_FITS, strict=True)))
+
+
+def _filled(around: Ints, ring: Ints) -> tuple[Ints, Ints]:
+    """Without the columns behind all neighbourhoods."""
     size = int((around >= 0).sum(axis=1).max(initial=1))
-    around, ring = around[:, :size], ring[:, :size]
-    frames = tangent_frames(_normals(stencils, vertices, around, ring))
-    k, areas = vertices.size, stencils.ring_areas
-    found = kernel.fits(
-        stencils.points, areas, stencils.orientable, around, ring, frames, *zip(*_FITS, strict=True)
-    )
+    return around[:, :size], ring[:, :size]
+
+
+def fitted(stencils: Stencils, vertices: Indices, tried: Trials | None = None) -> Surfaces:
+    """Fit surfaces at vertices (k,) of a face list, which may have been `tried`."""
+    from quadcurv.kernels import nearby
+    from quadcurv.kernels import surfaces as kernel
+
+    around, ring, frames, found = tried or trials(stencils, vertices)
+    around, ring = _filled(around, ring)
+    k = vertices.size
     noise, gain = found[..., kernel.NOISE], found[..., kernel.GAIN]
     # Residuals of the vertices near tell more than those of one, which may be few.
     place = np.full(len(stencils.points), -1)
@@ -130,8 +168,12 @@ def wide(stencils: Stencils) -> Bools:
 
     Strips of faces one wide have none, and tell nothing of the curvature across them.
     """
-    corners = np.where(stencils.faces[:, 3:] < 0, 1, 2) * (stencils.faces >= 0)
-    turn = np.bincount(np.abs(stencils.faces).ravel(), corners.ravel(), len(stencils.points))
+    from quadcurv.kernels import topology
+
+    faces, open_ = stencils.faces, np.flatnonzero(~stencils.closed)
+    faces = faces[topology.surroundings(faces, open_, len(stencils.points), 1)]
+    corners = np.where(faces[:, 3:] < 0, 1, 2) * (faces >= 0)
+    turn = np.bincount(np.abs(faces).ravel(), corners.ravel(), len(stencils.points))
     return np.asarray(stencils.closed | (turn[: stencils.n] >= _TURN))
 
 

@@ -17,11 +17,13 @@ import numpy as np
 from quadcurv.boundary import (
     REACH,
     Surfaces,
+    Trials,
     checked_boundary,
     fitted,
     ghost_layer,
     ghosts,
     poles,
+    trials,
     welded,
     wide,
 )
@@ -30,7 +32,7 @@ from quadcurv.drivers.rings import FaceRings, GridWindows, bundles
 from quadcurv.mesh import Mesh, QuadGrid, QuadMesh, StaggeredGrid
 from quadcurv.schemes import Curvatures, Fit, StandardErrors
 from quadcurv.stencils import Stencils
-from quadcurv.types import Bools, Floats, Indices
+from quadcurv.types import Bools, Floats, Indices, Ints
 
 _GHOST_DEGREE, _GHOST_LAYERS = 5, 3
 ROUNDING = 2.0**-49  # of positions, and of what is computed from them
@@ -75,6 +77,8 @@ class MeshNeighbourhoods:
         else:
             self.wanted = self.present & _seen_across(mesh, self.stencils)
         self.completed: dict[int, Floats] = {}
+        self._tried: Trials | None = None
+        self._tried_at = np.full(self.stencils.n, -1)
         x = self.stencils.points[: self.stencils.n]
         self.rounding = ROUNDING * largest(x if self.present.all() else x[self.present])
 
@@ -198,7 +202,7 @@ class MeshNeighbourhoods:
             return []
         if rings not in self._replaced:
             cells = isinstance(self.mesh, StaggeredGrid)
-            self._replaced[rings] = [] if cells else _continued(self.stencils, rings)
+            self._replaced[rings] = [] if cells else _continued(self.stencils, rings, self._fitted)
             left = self.present & ~self.stencils.closed
             for replaced in self._replaced[rings]:
                 left &= replaced.place < 0
@@ -229,10 +233,7 @@ class MeshNeighbourhoods:
         """Neighbourhoods completed by points of fitted surfaces, as stencils that lead to these points."""
         if not vertices.size:
             return []
-        key = vertices.tobytes()
-        if key not in self._surfaces:  # the same for every number of rings
-            self._surfaces[key] = fitted(self.stencils, vertices)
-        surfaces = self._surfaces[key]
+        surfaces = self._fitted(vertices)
         rows = np.flatnonzero(np.isfinite(surfaces.error))
         if rows.size == 0:
             return []
@@ -246,9 +247,22 @@ class MeshNeighbourhoods:
         faces = FaceRings(bundles(points), surfaces.frames[:, 2])
         return [_Beyond(faces, place, 1, error if inside else None)]
 
+    def _fitted(self, vertices: Indices) -> Surfaces:
+        """Surfaces at vertices, none of which is fitted twice."""
+        new = vertices[self._tried_at[vertices] < 0]
+        if new.size or self._tried is None:
+            tried, before = trials(self.stencils, new, self._corners), self._tried
+            self._tried_at[new] = np.arange(new.size) + (0 if before is None else len(before.found))
+            self._tried = tried if before is None else before.and_(tried)
+        return fitted(self.stencils, vertices, self._tried.of(self._tried_at[vertices]))
+
     @cached_property
-    def _surfaces(self) -> dict[bytes, Surfaces]:
-        return {}
+    def _corners(self) -> tuple[Indices, Ints]:
+        from quadcurv.kernels import topology
+
+        if self.present.all():
+            return self._faces.corners
+        return topology.corners_by_vertex(self.stencils.faces, len(self.stencils.points))
 
     @cached_property
     def _replaced(self) -> dict[int, list[_Beyond]]:
@@ -267,8 +281,11 @@ class _Beyond(NamedTuple):
     error: Floats | None = None
 
 
-def _continued(stencils: Stencils, layers: int) -> list[_Beyond]:
-    """The mesh near its border with ghosts, for vertices whose ghosts are all smooth."""
+def _continued(stencils: Stencils, layers: int, fitted: Callable[[Indices], Surfaces]) -> list[_Beyond]:
+    """The mesh near its border with ghosts, for vertices whose ghosts are all smooth.
+
+    Where it is in doubt whether they are, surfaces `fitted` there are asked.
+    """
     from quadcurv.kernels import topology
 
     border = np.flatnonzero(~stencils.closed)
@@ -284,7 +301,7 @@ def _continued(stencils: Stencils, layers: int) -> list[_Beyond]:
     if unsure.size:
         # What is looked at with many others, by polynomials of a higher degree, must be right beyond doubt.
         share = 1.0 if layers < _GHOST_LAYERS else _SURE
-        closed[unsure] = layer.error[unsure] <= share * fitted(part, unsure).error
+        closed[unsure] = layer.error[unsure] <= share * fitted(kept[unsure]).error
     ghosted = replace(part, points=points, faces=faces, closed=closed)
     near = np.arange(len(points)) >= part.n
     bad = np.zeros(len(points), bool)
@@ -301,11 +318,13 @@ def _continued(stencils: Stencils, layers: int) -> list[_Beyond]:
 
 def _seen_across(mesh: Mesh, stencils: Stencils) -> Bools:
     """(n,): not vertices far within strips of faces one wide, whose points tell nothing across them."""
+    from quadcurv.kernels import topology
+
     seen = np.ones(stencils.n, bool)
     if isinstance(mesh, StaggeredGrid) or stencils.closed.all():
         return seen
-    corners = np.where(stencils.faces < 0, stencils.faces[:, :1], stencils.faces)
-    if stencils.closed[corners].any(axis=1).all():
+    inside = np.flatnonzero(stencils.closed)
+    if topology.surroundings(stencils.faces, inside, len(stencils.points), 1).size == len(stencils.faces):
         return seen
     seen = wide(stencils)
     for _ in range(2):
@@ -315,9 +334,11 @@ def _seen_across(mesh: Mesh, stencils: Stencils) -> Bools:
 
 def _with_neighbours(stencils: Stencils, chosen: Bools) -> Bools:
     """Vertices and those of the faces around them."""
-    corners = np.where(stencils.faces < 0, stencils.faces[:, :1], stencils.faces)
-    near = np.pad(chosen, (0, len(stencils.points) - stencils.n))
-    near[corners[near[corners].any(axis=1)]] = True
+    from quadcurv.kernels import topology
+
+    near, faces = np.pad(chosen, (0, len(stencils.points) - stencils.n)), stencils.faces
+    faces = faces[topology.surroundings(faces, np.flatnonzero(near), near.size, 1)]
+    near[faces[faces >= 0]] = True
     return near[: stencils.n]
 
 

@@ -19,8 +19,6 @@ WIDTH fits, a block, go through every step together, in registers side by side.
 
 from math import inf, nan
 
-import numpy as np
-
 from quadcurv.kernels.compiled import flat, kernel
 from quadcurv.kernels.factor import TALL, factor, last_rows, table_of
 from quadcurv.kernels.formulas import WIDTH, put_lanes, real, root, span, where
@@ -52,6 +50,7 @@ from quadcurv.kernels.moments import (
     into_planes_beside,
     moments_degree,
     moments_of,
+    new_rows,
     row,
     rows,
     spread_2,
@@ -76,13 +75,6 @@ def count_of(degree):
     return (degree + 1) * (degree + 2) // 2
 
 
-def _rows(count):
-    """So many rows of zeros, each in one line of the caches: others take twice as long to read."""
-    values = np.zeros((count + 1) * WIDTH)
-    first = -values.ctypes.data % (8 * WIDTH) // 8
-    return values[first : first + count * WIDTH]
-
-
 def workspace(degree, room):
     """Scratch of `_fit`.
 
@@ -100,7 +92,7 @@ def workspace(degree, room):
         ROWS * room, ROWS_OF_LANE, 2 * even * CHUNK, CHUNK, len(moments_of(even)), (T + 1 + TALL) * T,
         T + 1 + TALL, 3 * T, COLUMNS,
     )  # fmt: skip
-    return *(_rows(size) for size in sizes), *table_of(degree)
+    return *map(new_rows, sizes), *table_of(degree)
 
 
 @step()

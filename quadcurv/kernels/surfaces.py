@@ -12,7 +12,7 @@ import numpy as np
 from quadcurv.kernels import ranges
 from quadcurv.kernels.compiled import flat, kernel
 from quadcurv.kernels.formulas import WIDTH, Carried, formula, real, root, span, where
-from quadcurv.kernels.moments import put_row, row, step
+from quadcurv.kernels.moments import new_rows, put_row, row, step
 
 DEGREE = 5
 TERMS = tuple((d - b, b) for d in range(1, DEGREE + 1) for b in range(d + 1))  # x^a y^b
@@ -21,8 +21,8 @@ CONDITION = 1e5
 SPREAD = 1.3  # radius at which weights vanish, of the neighbourhood's
 STEEP = 0.45  # cosine between normals; where it is less, polynomials of several rings do not follow
 SPARE = 2  # points more than terms; with fewer residuals are small by chance
-TALL = 4  # columns that are done at once
-COLUMNS = len(TERMS) + TALL  # of the terms of a point
+TALL = 5  # columns that are done at once
+COLUMNS = len(TERMS) + 1
 TINY = 2.0**-1022
 # Rows of a result: the map, coefficients, noise, its gain beyond the border and in H.
 MAP, COEFFICIENTS, NOISE, GAIN, BEND = 0, 4, 24, 25, 26
@@ -104,46 +104,54 @@ def weighted(P, lane, size, out, rows):
     put_row(lane, MOST, 0.0)
 
 
+def project(rows, size, k, j, upper, zero, before):
+    """Make the columns from j on that follow column k orthogonal to it; what `before` does comes first."""
+    sums = Carried((zero,) * TALL)
+    for m in span(1, size):
+        x = before(m)
+        sums.set(tuple(s + x * row(rows, COLUMNS * m + j + i) for i, s in enumerate(sums.get())))
+    sums = sums.get()
+    for m in span(1, size):
+        x = row(rows, COLUMNS * m + k)
+        for i, s in enumerate(sums):
+            at = COLUMNS * m + j + i
+            put_row(rows, at, where(j + i > k, row(rows, at) - x * s, row(rows, at)))
+    for i, s in enumerate(sums):
+        put_row(upper, COLUMNS * k + j + i, s)
+
+
 @step()
-def factor(rows, size, T, upper, lane):
-    """Make the first T columns orthonormal, and leave of the last one what is orthogonal to them."""
-    last = COLUMNS - 1
-    for k in span(0, T):
-        sums = Carried((0.0 * row(lane, COUNT),) * 2)
-        for m in span(1, size):
-            x, (square, height) = row(rows, COLUMNS * m + k), sums.get()
-            sums.set((square + x * x, height + x * row(rows, COLUMNS * m + last)))
-        square, height = sums.get()
-        norm, least, most = root(square), row(lane, LEAST), row(lane, MOST)
-        put_row(lane, LEAST, where(norm < least, norm, least))
-        put_row(lane, MOST, where(norm > most, norm, most))
-        inverse = 1.0 / where(norm > 0, norm, 1.0)
-        height = height * inverse
-        put_row(upper, COLUMNS * k + k, norm)
-        put_row(upper, COLUMNS * k + last, height)
-        for m in span(1, size):
-            x = row(rows, COLUMNS * m + k) * inverse
-            put_row(rows, COLUMNS * m + k, x)
-            put_row(rows, COLUMNS * m + last, row(rows, COLUMNS * m + last) - x * height)
-        for t in span(0, (T - k - 2 + TALL) >> 2):
-            j = k + 1 + TALL * t
-            sums = Carried((0.0 * square,) * TALL)
+def factor(rows, size, T, groups, upper, lane):
+    """Make the first T columns orthonormal, and leave of the last one what is orthogonal to them.
+
+    TALL columns at once, which then stay in the first-level cache, against all that are before them.
+    """
+    last, zero = COLUMNS - 1, 0.0 * row(lane, COUNT)
+    for t in span(0, groups):
+        j = TALL * t
+        for k in span(0, j):
+            project(rows, size, k, j, upper, zero, lambda m, k=k: row(rows, COLUMNS * m + k))
+        for k in span(j, j + TALL):
+            sums = Carried((zero, zero))
             for m in span(1, size):
-                x = row(rows, COLUMNS * m + k)
-                others = [row(rows, COLUMNS * m + j + i) for i in range(TALL)]
-                sums.set(tuple(s + x * other for s, other in zip(sums.get(), others, strict=True)))
-            sums = sums.get()
-            for m in span(1, size):
-                x = row(rows, COLUMNS * m + k)
-                for i in range(TALL - 1):
-                    put_row(rows, COLUMNS * m + j + i, row(rows, COLUMNS * m + j + i) - x * sums[i])
-                # The last one, beyond the terms, may be that of the heights.
-                i = COLUMNS * m + j + TALL - 1
-                put_row(rows, i, row(rows, i) - where(j + TALL - 1 < last, x, 0.0 * x) * sums[-1])
-            for i in range(TALL - 1):
-                put_row(upper, COLUMNS * k + j + i, sums[i])
-            i = COLUMNS * k + j + TALL - 1
-            put_row(upper, i, where(j + TALL - 1 < last, sums[-1], row(upper, i)))
+                x, (square, height) = row(rows, COLUMNS * m + k), sums.get()
+                sums.set((square + x * x, height + x * row(rows, COLUMNS * m + last)))
+            square, height = sums.get()
+            norm, least, most = root(square), row(lane, LEAST), row(lane, MOST)
+            inverse = 1.0 / where(norm > 0, norm, 1.0)
+            height = where(k < T, height * inverse, 0.0)  # of columns beyond the terms nothing is left
+            put_row(lane, LEAST, where(k < T, where(norm < least, norm, least), least))
+            put_row(lane, MOST, where(k < T, where(norm > most, norm, most), most))
+
+            def normal(m, k=k, inverse=inverse, height=height):
+                x = row(rows, COLUMNS * m + k) * inverse
+                put_row(rows, COLUMNS * m + k, x)
+                put_row(rows, COLUMNS * m + last, row(rows, COLUMNS * m + last) - x * height)
+                return x
+
+            project(rows, size, k, j, upper, zero, normal)
+            put_row(upper, COLUMNS * k + k, norm)
+            put_row(upper, COLUMNS * k + last, height)
 
 
 @step()
@@ -285,7 +293,7 @@ def _fits(
             if size > 0:
                 into_map(P, lane, size, out)
                 weighted(P, lane, size, out, rows)
-                factor(rows, size, T, upper, lane)
+                factor(rows, size, T, (T + TALL - 1) // TALL, upper, lane)
                 solve(upper, T, inverse, lane, out)
                 leave(rows, P, size, T, lane, out)
                 mean_terms(out, own)
@@ -329,7 +337,7 @@ def fits(points, areas, orientable, around, ring, frames, degrees, rings):
     sizes = POINT * room, LANES, RESULTS, COLUMNS * room, COLUMNS * COLUMNS, COLUMNS * COLUMNS, COLUMNS
 
     def part(start, stop):
-        scratch = [np.zeros(WIDTH * size) for size in sizes]
+        scratch = map(new_rows, sizes)
         _fits(*given, found.reshape(-1), start, stop, *scratch, np.zeros(WIDTH * j, np.int64))
 
     ranges.over(part, k, 200 * k, WIDTH)
