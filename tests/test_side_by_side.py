@@ -177,7 +177,7 @@ def test_windows_of_grids_end_at_its_sides(rings, wrap):
     rows, columns = 12, 30
     blocks, found = gather.Blocks((2 * rings + 1) ** 2), []
     blocks.begin(np.arange(rows * columns, dtype=np.int32))
-    gather.windows((rows, columns), wrap, rings, blocks)
+    gather.Windows((rows, columns), wrap, rings).put(blocks)
     index = blocks.index.reshape(-1, blocks.room, WIDTH)
     for k in range(rows * columns):
         i, j = divmod(k, columns)

@@ -205,6 +205,6 @@ def _over(fits: Callable[[Floats, int, int], None], size: int, nested: int) -> F
     """(size, nested COLUMNS): run a kernel over ranges, by several threads where they are many."""
     from quadcurv.kernels import formulas, jet, ranges
 
-    out = np.empty((nested * jet.COLUMNS, size))
+    out = jet.results(nested, size)
     ranges.over(lambda start, stop: fits(out, start, stop), size, _WORK * size, formulas.WIDTH)
-    return out.T
+    return out[:, :size].T

@@ -97,13 +97,22 @@ def _windows(row_of, column_of, rings, centres, blocks, index, counts, beside):
             fill(index, at, counts[k], room, c)
 
 
-def windows(shape, wrap, rings, blocks):
-    """Put windows of 2 rings + 1 points in both directions into blocks, as far as the grid goes."""
-    places = []
-    for size, wraps in zip(shape, wrap, strict=True):
-        at = np.arange(-rings, size + rings)
-        places.append(flat(at % size if wraps else np.where((at >= 0) & (at < size), at, -1), np.int32))
-    _windows(*places, rings, blocks.centres, blocks.size, blocks.index, blocks.counts, blocks.beside)
+class Windows:
+    """Windows of 2 rings + 1 points in both directions, as far as a grid goes."""
+
+    def __init__(self, shape, wrap, rings):
+        places = []
+        for size, wraps in zip(shape, wrap, strict=True):
+            at = np.arange(-rings, size + rings)
+            inside = (at >= 0) & (at < size)
+            places.append(flat(at % size if wraps else np.where(inside, at, -1), np.int32))
+        self._given = *places, rings
+
+    def put(self, blocks):
+        """Put those of the centres into blocks; how much room one needs."""
+        given = blocks.centres, blocks.size, blocks.index, blocks.counts, blocks.beside
+        _windows(*self._given, *given)
+        return blocks.room
 
 
 @formula

@@ -22,7 +22,7 @@ from math import inf, nan
 from quadcurv.kernels.compiled import flat, kernel
 from quadcurv.kernels.factor import TALL, factor, last_rows, table_of
 from quadcurv.kernels.formulas import WIDTH, put_lanes, real, root, span, where
-from quadcurv.kernels.gather import Blocks, Rings, windows
+from quadcurv.kernels.gather import Blocks, Rings, Windows
 from quadcurv.kernels.moments import (
     AXES,
     BEND,
@@ -73,6 +73,18 @@ SIGMA, GAIN, CONDITION, BIAS, SQUARE, FREEDOM, LOWER, WHOLE, COLUMNS = 13, 14, 1
 def count_of(degree):
     """Of terms."""
     return (degree + 1) * (degree + 2) // 2
+
+
+def results(nested, size):
+    """Room for (nested COLUMNS, size) results, or some more.
+
+    A block of a column is one line of the caches, and long columns are an odd number of pages of memory and
+    one line apart: else processors would remember all of them in the same few places.
+    """
+    lines, page = -(-size // WIDTH), 64
+    if lines > page:
+        lines = (-(-lines // page) | 1) * page + 1
+    return new_rows(nested * COLUMNS * lines).reshape(nested * COLUMNS, -1)
 
 
 def workspace(degree, room):
@@ -215,18 +227,14 @@ def grid_fits(points, normals, wrap, vertices, degree, rings, kind, out, start, 
     rings : int
     kind : int
         One of KINDS.
-    out : (COLUMNS, k), (2 COLUMNS, k) or (3 COLUMNS, k) float64
+    out : (COLUMNS, k), (2 COLUMNS, k) or (3 COLUMNS, k) float64, or more columns
         Columns from `start` to `stop` are filled, further rows by the same fits of two and of four degrees
         less, at least 2, which need no moments of their own; not of SMOOTH and FLAT ones. With several rings
         all is NaN, the CONDITION too, where the neighbourhood is too steep; with any, all but the CONDITION,
         infinite then, where it does not determine the polynomial.
     """
-
-    def gather(blocks):
-        windows(points.shape[:2], wrap, rings, blocks)
-        return blocks.room
-
-    _fits(points, normals, vertices, degree, kind, rings, True, gather, out, start, stop)
+    around = Windows(points.shape[:2], wrap, rings)
+    _fits(points, normals, vertices, degree, kind, rings, True, around.put, out, start, stop)
 
 
 def face_fits(

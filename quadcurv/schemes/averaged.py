@@ -60,45 +60,55 @@ class Candidate:
 
 def least_risks(
     around: Neighbourhoods, vertices: Indices
-) -> Iterator[tuple[Indices, Floats, int, int, Floats, Floats]]:
-    """Fits that are better than those before: vertices, results, degree, rings, noise, biases.
+) -> Iterator[tuple[Indices, Floats, Indices, int, int, Floats, Floats]]:
+    """Fits that are better than those before: vertices, results, their rows, degree, rings, noise, biases.
 
     Noise is the variance of the positions along the normal, biases (k, 4) are those of H, K, k1 and k2.
     """
     from quadcurv.kernels import jet as kernel
 
     following, least = np.full(vertices.size, min(_FOLLOWING)), np.full(vertices.size, np.inf)
-    noise2, values, made2 = np.empty(0), *np.full((2, vertices.size, 4), np.nan)
+    noise2, (values, made2) = np.empty(0), np.full((2, 4, vertices.size), np.nan)
     for r, (even, lower) in _FOLLOWING.items():
         at = np.flatnonzero(following == r)
         if at.size == 0:
             continue
-        fits = around.polynomials(vertices[at], 6, r, ghosts=False, kind=kernel.ROUND, nested=3)
+        some = at if at.size < vertices.size else slice(None)  # of which nothing is copied
+        here = vertices[some]
+        fits = around.polynomials(here, 6, r, ghosts=False, kind=kernel.ROUND, nested=3)
         if noise2.size == 0:  # all have begun
             of = fits[0][:, [kernel.SQUARE, kernel.FREEDOM]]
             of = np.where(of[:, 1:] > 0, of, np.nan)  # a fit that magnifies noise tells of it
             square, freedom = spread(around, vertices, of, _NOISE).T
             noise2 = square / freedom
-        candidates = list(_candidates(around, vertices[at], r, noise2[at], fits))
+        noise2_here = noise2[some]
+        candidates = list(_candidates(around, here, r, noise2_here, fits))
         risks = np.stack([c.risk for c in candidates])
         best, risk = np.argmin(risks, axis=0), np.min(risks, axis=0)
-        chosen = best, np.arange(at.size)
-        most2 = np.stack([c.most2 for c in candidates])[chosen]
-        # What the difference to the fit before has beyond noise is bias (Hausman 1978).
-        new, gain = fits[..., :4][chosen], fits[..., kernel.GAIN : kernel.GAIN + 4][chosen]
-        made = (gain * np.sqrt(noise2[at, None])) ** 2  # by noise; squares of gains alone may overflow
-        beyond = (new - values[at]) ** 2 - np.maximum(made2[at] - made, 0.0)
-        better = risk < least[at]
-        beyond = spread(around, vertices[at], np.where(better[:, None], beyond, np.nan), _POOL)
-        bias2 = np.fmax(most2[:, None] * (_CAUTION * gain / gain[:, :1]) ** 2, _BEYOND * beyond)
-        bias = np.sqrt(np.fmax(bias2, 0.0))
+        most2 = _of_best(best, [c.most2 for c in candidates])
+        # What the difference to the fit before has beyond noise is bias (Hausman 1978). Columns of fits lie
+        # one after the other.
+        new = _of_best(best, [c.fits.T[:4] for c in candidates])
+        gain = _of_best(best, [c.fits.T[kernel.GAIN : kernel.GAIN + 4] for c in candidates])
+        made = (gain * np.sqrt(noise2_here)) ** 2  # by noise; squares of gains alone may overflow
+        beyond = (new - values[:, some]) ** 2 - np.maximum(made2[:, some] - made, 0.0)
+        better = risk < least[some]
+        beyond = spread(around, here, np.where(better, beyond, np.nan).T, _POOL).T
+        bias2 = np.fmax(most2 * (_CAUTION[:, None] * gain / gain[:1]) ** 2, _BEYOND * beyond)
+        bias = np.sqrt(np.fmax(bias2, 0.0)).T
         for k, c in enumerate(candidates):
-            now = (best == k) & better
-            yield vertices[at[now]], c.fits[now], c.degree, r, noise2[at[now]], bias[now]
-        on = (risk < _WORSE * least[at]) | np.isinf(least[at])
-        least[at] = np.minimum(risk, least[at])
-        values[at[better]], made2[at[better]] = new[better], made[better]
-        following[at] = np.where(on, np.where(best > 0, lower, even), 0)
+            rows = np.flatnonzero((best == k) & better)
+            yield here[rows], c.fits, rows, c.degree, r, noise2_here[rows], bias[rows]
+        on = (risk < _WORSE * least[some]) | np.isinf(least[some])
+        least[some] = np.minimum(risk, least[some])
+        values[:, some] = np.where(better, new, values[:, some])
+        made2[:, some] = np.where(better, made, made2[:, some])
+        following[some] = np.where(on, np.where(best > 0, lower, even), 0)
+
+
+def _of_best(best: Indices, values: list[Floats]) -> Floats:
+    """Those of the best of three candidates."""
+    return np.where(best == 0, values[0], np.where(best == 1, values[1], values[2]))
 
 
 def _candidates(
@@ -156,8 +166,10 @@ def sound(fits: Floats, degree: int) -> Bools:
 
 def spread(around: Neighbourhoods, vertices: Indices, values: Floats, rings: int) -> Floats:
     """Means over neighbours among some vertices."""
-    whole = np.full((around.wanted.size, values.shape[1]), np.nan)
-    whole[vertices] = values
+    whole = values
+    if vertices.size < around.wanted.size:
+        whole = np.full((around.wanted.size, values.shape[1]), np.nan)
+        whole[vertices] = values
     for _ in range(rings):
         whole = around.pooled(whole)
-    return whole[vertices]
+    return whole if vertices.size == len(whole) else whole[vertices]

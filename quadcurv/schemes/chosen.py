@@ -106,16 +106,25 @@ class _Found:
         others = np.reshape(beyond, (-1, 1)) * gain / gain[:, :1]
         self.bias[at] = np.hypot(fits[:, kernel.BIAS : kernel.BIAS + 4], others)
 
-    def put_noisy(self, at: Indices, fits: Floats, d: int, r: int, noise: Floats, bias: Any) -> None:
-        """Results of fits by plain least squares, and their bias."""
-        self.values[at], self.degree[at], self.rings[at], self.is_smooth[at] = fits, d, r, False
-        self.sigma[at], self.freedom[at] = noise, np.maximum(fits[:, self.kernel.FREEDOM], 1.0)
+    def put_noisy(
+        self, at: Indices, fits: Floats, d: int, r: int, noise: Floats, bias: Any, rows: Any = slice(None)
+    ) -> None:
+        """Results of fits by plain least squares, or of some rows of them, and their bias."""
+        for own, column in zip(self.values.T, fits.T, strict=True):  # which lie one after the other
+            own[at] = column[rows]
+        self.degree[at], self.rings[at], self.is_smooth[at] = d, r, False
+        self.sigma[at], self.freedom[at] = noise, np.maximum(fits[rows, self.kernel.FREEDOM], 1.0)
         self.bias[at] = bias
 
     def take(self, other: _Found, at: Indices) -> None:
-        """Results of another."""
+        """Results of another, which is nobody's then."""
         for name in ("values", "degree", "rings", "is_smooth", "sigma", "freedom", "bias"):
-            getattr(self, name)[at] = getattr(other, name)[at]
+            if at.size == len(self.values):
+                setattr(self, name, getattr(other, name))
+                continue
+            own, others = (np.atleast_2d(getattr(x, name).T) for x in (self, other))
+            for k in range(len(own)):
+                own[k, at] = others[k, at]
 
     def clear(self, at: Indices) -> None:
         """Nothing is known again."""
@@ -403,8 +412,8 @@ def _average(around: Neighbourhoods, noisy: Bools, hardly: Bools, found: _Found)
     vertices, other = np.flatnonzero(noisy | hardly), _Found(around)
     if vertices.size == 0:
         return noisy
-    for at, fits, d, r, noise2, bias in averaged.least_risks(around, vertices):
-        other.put_noisy(at, fits, d, r, np.sqrt(noise2), bias)
+    for at, fits, rows, d, r, noise2, bias in averaged.least_risks(around, vertices):
+        other.put_noisy(at, fits, d, r, np.sqrt(noise2), bias, rows)
     todo = np.flatnonzero(noisy & (other.degree == 0))
     for d, r in _MORE:
         if todo.size == 0:
