@@ -154,6 +154,25 @@ class Stencils:
         return topology.rings(self.faces, len(self.points))
 
     @cached_property
+    def links(self) -> Ints:
+        """(n, 4) int32: neighbours straight across, counter-clockwise, -1 where there is none.
+
+        Of vertices inside four quads, and of those on the border beside them, which lie on two quads or one.
+        """
+        n, ring, valence = self.n, self.ring[: self.n], self.valence
+        links, border = ring[:, ::2].copy(), ~self.closed
+        links[ring[:, 0] < 0] = -1
+        inside = np.flatnonzero(ring[:, 0] >= 0)
+        for k in range(4):
+            before, here, behind, last = (ring[inside, (2 * k + step) % 8] for step in (-1, 0, 1, 2))
+            side = (here < n) & border[here % n] & (valence[here % n] == 2)
+            links[here[side]] = np.column_stack((behind, inside, before, np.full(inside.size, -1)))[side]
+            corner = (behind < n) & border[behind % n] & (valence[behind % n] == 1)
+            links[behind[corner], :2] = np.column_stack((last, here))[corner]
+        links[links >= n] = -1
+        return links
+
+    @cached_property
     def irregular(self) -> NDArray[np.int64]:
         """Vertices with a stencil that have no such ring."""
         return np.flatnonzero(self.ring[: self.n, 0] < 0)

@@ -56,8 +56,9 @@ def test_second_order_at_the_poles_of_an_ellipsoid(scheme):
         H = np.abs(qc.mean_curvature(qc.QuadGrid(points, (True, False)), scheme))
         error = np.abs(H - mean_curvature_of_ellipsoid(points, AXES))
         errors.append(error[:, [0, 1, -2, -1]].max())
-        assert error[:, [0, 1, -2, -1]].max() < 3 * error[:, 2:-2].max()
-    assert errors[-1] < 0.02
+        if scheme != "jet":  # which is exact to eight digits along the lines of the grid, where there are any
+            assert error[:, [0, 1, -2, -1]].max() < 3 * error[:, 2:-2].max()
+    assert errors[-1] < (1e-6 if scheme == "jet" else 0.02)
     assert errors[-1] < errors[0] / 8
 
 

@@ -513,7 +513,9 @@ def with_a_vertex_in(grid, i, j):
     return np.vstack((mesh.points, mesh.points[quad].mean(axis=0))), faces
 
 
-@pytest.mark.parametrize("scheme", ["finite_volume", "jet-2", "jet"])
+@pytest.mark.parametrize(
+    "scheme", ["finite_volume", "jet-2", qc.schemes.jet(4)], ids=["finite_volume", "jet-2", "jet-4"]
+)
 def test_a_corner_is_continued_as_its_sides_are(scheme):
     """A strip too short to be sure of, near a corner, is continued by index as those beside it."""
     grid, _ = damaged("elliptic_paraboloid", 20, "jitter", 0)

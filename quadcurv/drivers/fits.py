@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import fields, replace
 from functools import cached_property
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -33,6 +33,9 @@ from quadcurv.mesh import Mesh, QuadGrid, QuadMesh, StaggeredGrid
 from quadcurv.schemes import Curvatures, Fit, StandardErrors
 from quadcurv.stencils import Stencils
 from quadcurv.types import Bools, Floats, Indices, Ints
+
+if TYPE_CHECKING:
+    from quadcurv.kernels.lines import Lines
 
 _GHOST_DEGREE, _GHOST_LAYERS = 5, 3
 ROUNDING = 2.0**-49  # of positions, and of what is computed from them
@@ -136,6 +139,21 @@ class MeshNeighbourhoods:
     def pooled(self, values: Floats) -> Floats:
         """(n, k): see `Neighbourhoods`."""
         return self._faces.means(values)
+
+    @property
+    def points(self) -> Floats:
+        """(n, 3): see `Neighbourhoods`."""
+        return self.stencils.points[: self.stencils.n]
+
+    @cached_property
+    def lines(self) -> Lines:
+        """See `Neighbourhoods`."""
+        from quadcurv.kernels.lines import lines
+
+        links, ends = self.stencils.links, ~self.present | (not self.stencils.orientable)
+        if ends.any():
+            links = np.where(ends[links] | ends[:, None], np.int32(-1), links)
+        return lines(links)
 
     def lattice(self, layers: int) -> Floats:
         """(r + 2 layers, c + 2 layers, 3): see `Neighbourhoods`."""

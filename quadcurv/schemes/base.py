@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Literal, NamedTuple, Protocol
+from typing import TYPE_CHECKING, Literal, NamedTuple, Protocol
 
 import numpy as np
 import scipy
@@ -12,6 +12,9 @@ import scipy
 from quadcurv import html
 from quadcurv.stencils import Stencils
 from quadcurv.types import Bools, Floats, Indices, Ints
+
+if TYPE_CHECKING:
+    from quadcurv.kernels.lines import Lines
 
 
 @dataclass(frozen=True)
@@ -127,7 +130,7 @@ class Curvatures:
         Standard deviation of the positions along the normal, from the residuals, in length.
     degree, rings : int32 or None
         Degree and neighbourhood of the fit at each vertex, 0 where there is none, 1 for the sphere nearest
-        to a ring of too few vertices.
+        to a ring of too few vertices, degree 8 for differences along the lines of the mesh.
     feature : bool or None
         Vertices on creases: the surface has no curvature there, and what is given grows as the mesh is
         refined. Fits beside a crease look at their own side of it. Of "jet" alone.
@@ -203,6 +206,10 @@ class Neighbourhoods(Protocol):
         Vertices whose ring of faces is open.
     on_crease, on_jump : (n,) bool
         Vertices on creases, and on lines at which the curvature jumps; round neighbourhoods end at both.
+    points : (n, 3) float64
+        Positions of the vertices.
+    lines : Lines
+        Lines straight on through vertices at which quads meet by four; none where no side is the outer one.
     """
 
     @property
@@ -218,6 +225,10 @@ class Neighbourhoods(Protocol):
     def on_crease(self) -> Bools: ...  # noqa: D102
     @property
     def on_jump(self) -> Bools: ...  # noqa: D102
+    @property
+    def points(self) -> Floats: ...  # noqa: D102
+    @property
+    def lines(self) -> Lines: ...  # noqa: D102
 
     def polynomials(
         self, vertices: Indices, degree: int, rings: int, ghosts: bool = True, kind: int = 0, nested: int = 1

@@ -15,7 +15,7 @@ import numpy as np
 import scipy
 
 from quadcurv.boundary import tangent_frames
-from quadcurv.schemes import averaged
+from quadcurv.schemes import averaged, lattice
 from quadcurv.schemes.base import Curvatures, Neighbourhoods, StandardErrors
 from quadcurv.schemes.quadric import quadrics
 from quadcurv.types import Bools, Floats, Indices
@@ -53,6 +53,8 @@ _AT_ONCE = 2**13  # vertices that quadrics are fitted at
 _EXACT = 1e-3  # of the residuals of quadratic fits: all lie on one quadric
 _DOUBT = 0.02  # of the curvature, from which errors on others are asked
 _NEARLY_ALL, _MOST = 0.8, 0.5
+# Of an error, as much as another way must claim to be taken, and to be believed against it.
+_CLEARLY_LESS, _SURER = 0.3, 0.1
 _FAR = 12  # rings over which noise is looked for at most, where all is steep
 POOLED = _FAR + averaged.POOLED
 # Fits over five rings at these, the normals of the rings, and how far creases and jumps are looked for.
@@ -198,8 +200,16 @@ def chosen(around: Neighbourhoods) -> Curvatures:
         known = here[:, kernel.CONDITION] <= _CONDITION[2]
         found.put_noisy(creased[known], here[known], 2, 1, here[known, kernel.SIGMA], 0.0)
     vertices = np.flatnonzero(around.wanted & ~feature)
-    if vertices.size == 0:
-        return found.curvatures(around.on_crease)
+    if vertices.size:
+        _smooth_or_noisy(around, vertices, found)
+    _along_lines(around, np.flatnonzero(around.wanted), found)
+    return found.curvatures(around.on_crease)
+
+
+def _smooth_or_noisy(around: Neighbourhoods, vertices: Indices, found: _Found) -> None:
+    """Take fits of heights, by what the three rings of vertices tell."""
+    from quadcurv.kernels import jet as kernel
+
     fits = _smooth(around, vertices, 6, 3)
     good = (fits[:, kernel.CONDITION] <= _CONDITION[6]) & np.isnan(around.border_error(3)[vertices])
     unresolved = good & ~_resolved(fits, 6, around.rounding)
@@ -219,7 +229,6 @@ def chosen(around: Neighbourhoods) -> Curvatures:
     vertices = vertices[~noisy[vertices]]
     least = np.where(sure[vertices], _DOUBT, 0.0)
     _quadrics(around, vertices[~(found.doubt(vertices, around.rounding) <= least)], found)
-    return found.curvatures(around.on_crease)
 
 
 def _smooth(around: Neighbourhoods, vertices: Indices, d: int, r: int, ghosts: bool = True) -> Floats:
@@ -277,6 +286,18 @@ def _quadrics(around: Neighbourhoods, vertices: Indices, found: _Found) -> None:
         at, fits = at[exact], fits[exact]
         apart = np.nan_to_num(np.abs(fits[:, :4] - found.values[at, :4])) / 2
         found.put_noisy(at, fits, 2, 3, fits[:, kernel.SIGMA], apart)
+
+
+def _along_lines(around: Neighbourhoods, vertices: Indices, found: _Found) -> None:
+    """Take differences along the lines of the mesh where these claim less error, and do not contradict."""
+    own, other = found.errors(vertices)[:, 0], _Found(around)
+    at, fits, noise, bias = lattice.differences(around, vertices, own)
+    other.put_noisy(at, fits, lattice.DEGREE, lattice.RINGS, noise, bias)
+    before, now = found.errors(at), other.errors(at)
+    # Where both are sure of something else, what is between them counts.
+    apart = np.abs(found.values[at, :4] - fits[:, :4])
+    other.bias[at] = np.where((apart > before + now) & (now > _SURER * before), apart / 2, bias)
+    found.take(other, at[now[:, 0] < _CLEARLY_LESS * before[:, 0]])
 
 
 def _in_noise(around: Neighbourhoods, vertices: Indices, untold: Bools, noisy: Bools) -> Bools:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
@@ -71,29 +73,45 @@ def _curvatures(around: Neighbourhoods, order: int) -> Curvatures:
         along = sliding_window_view(x, order + 1, 0) @ _WEIGHTS[order][i]
         return sliding_window_view(along, order + 1, 1) @ _WEIGHTS[order][j]
 
-    X1, X2 = derivative(1, 0), derivative(0, 1)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        # Orthonormal tangents e1 = X1 / s, e2 = (X2 - f / s X1) / g.
-        s = np.linalg.norm(X1, axis=-1)
-        cross = np.cross(X1, X2)
-        area = np.linalg.norm(cross, axis=-1)
-        normal, e1 = cross / area[..., None], X1 / s[..., None]
-        e2 = np.cross(normal, e1)
-        f, g = _dot(X2, e1) / s, area / s
-        L, M, N = (_dot(X, normal) for X in (derivative(2, 0), derivative(1, 1), derivative(0, 2)))
-        a, b, c = -L / s**2, -(M - f * L) / (s * g), -(N - 2 * f * M + f * f * L) / g**2
-    H, half = (a + c) / 2, (a - c) / 2
-    root, angle = np.hypot(half, b), np.arctan2(b, half)[..., None] / 2
+    orders = (1, 0), (0, 1), (2, 0), (1, 1), (0, 2)
+    (a, b, c), (e1, e2, normal), _ = shape_operator(*(derivative(*o).reshape(-1, 3).T for o in orders))
+    angle = np.arctan2(b, (a - c) / 2) / 2
+    cos, sin = np.cos(angle), np.sin(angle)
     return Curvatures(
-        mean=H.ravel(),
-        gaussian=(a * c - b * b).ravel(),
-        k1=(H + root).ravel(),
-        k2=(H - root).ravel(),
-        direction1=(np.cos(angle) * e1 + np.sin(angle) * e2).reshape(-1, 3),
-        direction2=(np.cos(angle) * e2 - np.sin(angle) * e1).reshape(-1, 3),
-        normal=normal.reshape(-1, 3),
+        *invariants(a, b, c), (cos * e1 + sin * e2).T, (cos * e2 - sin * e1).T, np.ascontiguousarray(normal.T)
     )
 
 
+def shape_operator(X1: Floats, X2: Floats, X11: Floats, X12: Floats, X22: Floats) -> tuple[Any, Any, Any]:
+    """By the derivatives (3, n) of positions.
+
+    Returns
+    -------
+    a, b, c : (n,) float64
+        ((a, b), (b, c)) in orthonormal tangents e1, e2.
+    e1, e2, normal : (3, n) float64
+    s, f, g : (n,) float64
+        X1 = s e1, X2 = f e1 + g e2.
+    """
+    from quadcurv.kernels import vector
+
+    with np.errstate(divide="ignore", invalid="ignore"):
+        s, cross = np.sqrt(_dot(X1, X1)), np.stack(vector.cross(X1, X2))
+        area = np.sqrt(_dot(cross, cross))
+        normal, e1 = cross / area, X1 / s
+        e2 = np.stack(vector.cross(normal, e1))
+        f, g = _dot(X2, e1), area / s
+        L, M, N = (_dot(X, normal) for X in (X11, X12, X22))
+        h = f / s
+        shape = -L / s**2, -(M - h * L) / (s * g), -(N - 2 * h * M + h * h * L) / g**2
+        return shape, (e1, e2, normal), (s, f, g)
+
+
+def invariants(a: Floats, b: Floats, c: Floats) -> tuple[Floats, Floats, Floats, Floats]:
+    """H, K, k1 and k2 of ((a, b), (b, c))."""
+    H, root = (a + c) / 2, np.hypot((a - c) / 2, b)
+    return H, a * c - b * b, H + root, H - root
+
+
 def _dot(x: Floats, y: Floats) -> Floats:
-    return np.einsum("...x,...x->...", x, y)
+    return x[0] * y[0] + x[1] * y[1] + x[2] * y[2]

@@ -33,7 +33,9 @@ def jet(degree: int | None = None, rings: int | None = None) -> Fit:
         polynomial of degree 6 over three rings, over the nearest sphere or the plane, whichever leaves less,
         through the vertex and with weights that fall with the distance; where noise prevails plain least
         squares of degree 6, 4 or 2 over three to eight rings, those of the least noise and bias together,
-        both estimated from residuals of neighbours; beside rough borders one-sided fits over more.
+        both estimated from residuals of neighbours; beside rough borders one-sided fits over more. Where
+        points are smooth along the mesh's own lines, as those of structured grids are, polynomials of
+        degree 8 in the number of the point through nine of each line, borders included.
     rings : int, optional
         Rings of faces around a vertex whose vertices are fitted, on a grid the window of
         (2 rings + 1)^2 points. By default 1 for degree 2, 3 for degree 6 and 2 for the others.
@@ -41,8 +43,9 @@ def jet(degree: int | None = None, rings: int | None = None) -> Fit:
     Returns
     -------
     Fit
-        The default's H is of order 6 where neighbourhoods are nearly symmetric and of order 5 elsewhere,
-        exact on spheres, and ``Curvatures.interval`` has its error bars.
+        The default's H is of order 8 on grids smooth in their numbers, else of order 6 where neighbourhoods
+        are nearly symmetric and of order 5 elsewhere, exact on spheres, and ``Curvatures.interval`` has its
+        error bars.
         With a degree, plain least squares as published: H of order 4 with degree 4, of order 6 with degree 6
         and of order 2 with the others where neighbourhoods are nearly symmetric, of order `degree` - 1
         elsewhere.

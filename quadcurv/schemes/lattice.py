@@ -1,0 +1,217 @@
+"""Differences along the lines of a mesh, where its points are smooth functions of their own numbers.
+
+Wherever quads meet by four a mesh has parameters: how many edges a point is away along the two lines through
+a vertex. The grids of codes, and surfaces by formulas, are smooth in them; there polynomials through nine
+points of each line, one-sided at borders, are far better than any fit of heights, which the surface's own
+bends foreshorten. How good they are, polynomials of lower degrees tell. How rough the points are along their
+lines, by noise or otherwise, their eighth differences tell where these differ from those around.
+
+Arrays of positions and their derivatives are (3, ...) here.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from quadcurv.schemes.base import Neighbourhoods
+from quadcurv.schemes.fundamental_forms import invariants, shape_operator
+from quadcurv.types import Bools, Floats, Indices, Ints
+
+if TYPE_CHECKING:
+    from quadcurv.kernels.lines import Lines
+
+DEGREE, RINGS = 8, 4
+_DEGREES = (4, 6, DEGREE)
+_POINTS, _HALF = DEGREE + 1, DEGREE // 2
+_LEAST = 4  # points of a closed line
+_AT_ONCE = 2**12  # vertices
+# Of differences, the neighbours' mean is taken off so often; then so many rings tell, by so many numbers.
+_PASSES, _AROUND, _FREEDOM = 3, 2, 20.0
+
+
+def _weights() -> Floats:
+    """(offset, degree, derivative, point): first and second derivatives at a point by those nearest to it."""
+    out = np.zeros((_POINTS, len(_DEGREES), 2, _POINTS))
+    for offset in range(_POINTS):
+        for k, d in enumerate(_DEGREES):
+            first = min(max(offset - d // 2, 0), DEGREE - d)
+            nodes = np.arange(first, first + d + 1) - offset
+            for j, node in enumerate(nodes):
+                others = np.delete(nodes, j)
+                terms = np.poly(others)[::-1] / np.prod(node - others)  # of whole numbers, hence exact
+                out[offset, k, :, first + j] = terms[1], 2 * terms[2]
+    return out
+
+
+_WEIGHTS = _weights()
+_ALL = _WEIGHTS.reshape(_POINTS, -1, _POINTS)
+_EIGHTH = np.broadcast_to(np.poly(np.ones(DEGREE)), (_POINTS, 1, _POINTS))
+_FIRST = np.concatenate((_WEIGHTS[:, -1, :1], _EIGHTH), axis=1)
+_LEAST_GAIN = np.linalg.norm(_WEIGHTS[_HALF, -1, 1]) / 2  # in H, times the square of the shorter edge
+# Square of what noise 1 is in the sum of both lines' eighth differences, less the means of neighbours.
+_OF_NOISE = 60729.1
+
+
+class _Windows(NamedTuple):
+    """The nine points of a line that are nearest to vertices.
+
+    Attributes
+    ----------
+    points : (9, k) int32
+    ways : (9, k) int8
+        The slots in which the line goes on.
+    offset : (k,) int64
+        Which of them is the vertex.
+    """
+
+    points: Ints
+    ways: Ints
+    offset: Indices
+
+
+def _windows(lines: Lines, axis: int, vertices: Indices) -> _Windows:
+    place = lines.place[axis, vertices]
+    line = lines.line[place]
+    begin, end, closed = lines.begin[line], lines.end[line], lines.closed[line]
+    start = np.where(closed, place - _HALF, np.clip(place - _HALF, begin, end - _POINTS))
+    at = start + np.arange(_POINTS)[:, None]
+    beyond = np.flatnonzero(closed & ((start < begin) | (start + _POINTS > end)))
+    begin, end = begin[beyond], end[beyond]
+    at[:, beyond] = begin + (at[:, beyond] - begin) % (end - begin)
+    return _Windows(lines.vertices[at], lines.ways[at], place - start)
+
+
+def _sums(weights: Floats, offset: Indices, values: Floats) -> Floats:
+    """(w, 3, k): by weights (offset, w, 9) of values (3, 9, k), a line backwards giving the same."""
+    out = np.empty((weights.shape[1], 3, offset.size))
+    for o in np.flatnonzero(np.bincount(offset, minlength=_POINTS)):
+        at = slice(None) if (offset == o).all() else np.flatnonzero(offset == o)
+        here = values[:, :, at]
+        for j, row in enumerate(weights[o]):
+            sums = row[_HALF] * here[:, _HALF]
+            for k in range(_HALF):
+                if row[k] or row[-1 - k]:
+                    sums += row[k] * here[:, k] + row[-1 - k] * here[:, -1 - k]
+            out[j][:, at] = sums
+    return out
+
+
+def _on_long_lines(lines: Lines) -> Bools:
+    """(n,): vertices on two lines of enough points."""
+    long = np.append(lines.end - lines.begin >= np.where(lines.closed, _LEAST, _POINTS), False)
+    line = np.append(lines.line, -1)  # that of place -1
+    return long[line[lines.place]].all(axis=0)
+
+
+def _blocks(vertices: Indices) -> Iterator[Indices]:
+    for start in range(0, vertices.size, _AT_ONCE):
+        yield vertices[start : start + _AT_ONCE]
+
+
+class Differences(NamedTuple):
+    """Curvatures by differences.
+
+    Attributes
+    ----------
+    at : (k,) int64
+        The vertices that have them.
+    fits : (k, COLUMNS) float64
+        In the columns of `kernels.jet`; NaN what is not said of them.
+    noise : (k,) float64
+        Of positions along their lines.
+    bias : (k, 4) float64
+        Of H, K, k1 and k2.
+    """
+
+    at: Indices
+    fits: Floats
+    noise: Floats
+    bias: Floats
+
+
+def differences(around: Neighbourhoods, vertices: Indices, error: Floats) -> Differences:
+    """Curvatures of vertices on two long lines, where noise alone does not make H worse than `error`."""
+    from quadcurv.kernels import jet as kernel
+
+    lines, n = around.lines, len(around.points)
+    points, slope, rough = around.points.T.copy(), np.full((3, 2, n), np.nan), np.full((3, n), np.nan)
+    for at in _blocks(np.flatnonzero(_on_long_lines(lines))):
+        here = points[:, at][:, None]
+        rough[:, at] = 0.0
+        for axis in range(2):
+            near = _windows(lines, axis, at)
+            slope[:, axis, at], eighth = _sums(_FIRST, near.offset, points.take(near.points, axis=1) - here)
+            rough[:, at] += eighth
+    rough = rough.T
+    for _ in range(_PASSES):
+        rough = rough - around.pooled(rough)
+    square = np.einsum("ij,ij->i", rough, rough)[:, None] / 3
+    for _ in range(_AROUND):
+        square = around.pooled(square)
+    noise = np.sqrt(square[:, 0] / _OF_NOISE)
+
+    shorter = np.einsum("jai,jai->ai", slope, slope).min(axis=0)[vertices]
+    found = vertices[noise[vertices] * _LEAST_GAIN < error * shorter]
+    fits, change = np.full((found.size, kernel.COLUMNS), np.nan), np.full((n, 8), np.nan)
+    fits[:, kernel.FREEDOM] = _FREEDOM
+    for start in range(0, found.size, _AT_ONCE):
+        at, out = found[start : start + _AT_ONCE], fits[start : start + _AT_ONCE].T
+        change[at], out[: kernel.NORMAL.stop], out[kernel.GAIN : kernel.GAIN + 4] = _block(
+            points, lines, slope, at
+        )
+    before, behind = np.hsplit(np.sqrt(around.pooled(change)[found]), 2)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        bias = np.where(behind < before, behind * (behind / before), behind)
+    known = np.isfinite(fits[:, : kernel.NORMAL.stop]).all(axis=1)
+    return Differences(found[known], fits[known], noise[found[known]], bias[known])
+
+
+def _block(points: Floats, lines: Lines, slope: Floats, at: Indices) -> tuple[Floats, Floats, Floats]:
+    """Squares of what each degree changes; the first columns of `kernels.jet`; what noise makes of four."""
+    first, second, mixed, near = [], [], [], [_windows(lines, axis, at) for axis in range(2)]
+    way = [lines.ways[lines.place[axis, at]] for axis in range(2)]
+    for axis, (on, ways, offset) in enumerate(near):
+        sums = _sums(_ALL, offset, points.take(on, axis=1) - points[:, at][:, None])
+        first.append(sums[0::2])
+        second.append(sums[1::2])
+        # Slopes of the lines across, which run the way that the vertex's own does, or against it.
+        across = (ways + (way[1 - axis] - way[axis])) & 3
+        line = across & 1
+        along = np.where(lines.ways[lines.place[line, on]] == across, 1.0, -1.0)
+        slopes = slope.reshape(3, -1).take(line * np.int64(slope.shape[2]) + on, axis=1) * along
+        mixed.append(_sums(_ALL[:, 0::2], offset, slopes))
+    left = np.where((way[1] - way[0]) & 3 == 1, 1.0, -1.0)  # counter-clockwise
+    both = left * (mixed[0] + mixed[1]) / 2
+    by = []
+    for k in range(3):
+        X1, X2 = first[0][k], left * first[1][k]
+        shape, frame, sides = shape_operator(X1, X2, second[0][k], both[k], second[1][k])
+        by.append(np.stack(invariants(*shape)))
+    (a, b, c), (e1, e2, normal) = shape, frame
+    angle = np.arctan2(b, (a - c) / 2) / 2
+    cos, sin = np.cos(angle), np.sin(angle)
+    directions = cos * e1 + sin * e2, cos * e2 - sin * e1
+    change = np.concatenate((by[1] - by[0], by[2] - by[1])).T ** 2
+    gains = _gains(by[2], cos, sin, sides, near[0].offset, near[1].offset)
+    return change, np.concatenate((by[2], *directions, normal)), gains
+
+
+def _gains(by: Floats, cos: Floats, sin: Floats, sides: Any, first: Indices, second: Indices) -> Floats:
+    """(4, k): of H, K, k1 and k2, to first order by the second derivatives alone."""
+    slope, bend = np.einsum("ojx,ojx->jo", _WEIGHTS[:, -1], _WEIGHTS[:, -1])
+    middle = _WEIGHTS[range(_POINTS), -1, 1, range(_POINTS)]
+    s, f, g = sides
+    parts, gains = [], []
+    with np.errstate(divide="ignore", invalid="ignore"):
+        for along, across in ((cos, sin), (-sin, cos)):  # along e1, e2; p and q times s along the lines
+            q = across * s / g
+            p = along - q * f / s
+            parts.append(np.stack((p * p, 2 * p * q, q * q)))
+        k1, k2 = parts
+        for u, v, w in ((k1 + k2) / 2, by[3] * k1 + by[2] * k2, k1, k2):
+            square = u * u * bend[first] + v * v * slope[first] * slope[second] + w * w * bend[second]
+            gains.append(np.sqrt(square + 2 * u * w * middle[first] * middle[second]) / (s * s))
+    return np.stack(gains)
