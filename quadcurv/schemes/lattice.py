@@ -51,6 +51,10 @@ _ALL = _WEIGHTS.reshape(_POINTS, -1, _POINTS)
 _EIGHTH = np.broadcast_to(np.poly(np.ones(DEGREE)), (_POINTS, 1, _POINTS))
 _FIRST = np.concatenate((_WEIGHTS[:, -1, :1], _EIGHTH), axis=1)
 _LEAST_GAIN = np.linalg.norm(_WEIGHTS[_HALF, -1, 1]) / 2  # in H, times the square of the shorter edge
+# Each degree changes the entries of the shape operator by a like part of what the one before did, but for
+# lines on which one happens to change nothing: hence over so many rings, so many times that part, and H and the
+# others by so much of all entries at least.
+_WIDE, _NEXT, _SHARE = 2, 3.0, 0.3
 # Square of what noise 1 is in the sum of both lines' eighth differences, less the means of neighbours.
 _OF_NOISE = 60729.1
 
@@ -155,18 +159,22 @@ def differences(around: Neighbourhoods, vertices: Indices, error: Floats) -> Dif
 
     shorter = np.einsum("jai,jai->ai", slope, slope).min(axis=0)[vertices]
     found = vertices[noise[vertices] * _LEAST_GAIN < error * shorter]
-    fits, change = np.full((found.size, kernel.COLUMNS), np.nan), np.full((n, 8), np.nan)
+    fits, change = np.full((found.size, kernel.COLUMNS), np.nan), np.full((n, 6), np.nan)
     fits[:, kernel.FREEDOM] = _FREEDOM
     for start in range(0, found.size, _AT_ONCE):
         at, out = found[start : start + _AT_ONCE], fits[start : start + _AT_ONCE].T
         change[at], out[: kernel.NORMAL.stop], out[kernel.GAIN : kernel.GAIN + 4] = _block(
             points, lines, slope, at
         )
-    before, behind = np.hsplit(np.sqrt(around.pooled(change)[found]), 2)
+    for _ in range(_WIDE):
+        change = around.pooled(change)
+    before, behind, *each = np.sqrt(change[found]).T
+    larger = np.abs(fits[:, kernel.K1 : kernel.K2 + 1]).max(axis=1)
+    whole = behind * np.stack((np.ones_like(larger), larger, np.ones_like(larger), np.ones_like(larger)))
     with np.errstate(divide="ignore", invalid="ignore"):
-        bias = np.where(behind < before, behind * (behind / before), behind)
+        bias = np.fmin(_NEXT * behind / before, 1.0) * np.fmax(each, _SHARE * whole)
     known = np.isfinite(fits[:, : kernel.NORMAL.stop]).all(axis=1)
-    return Differences(found[known], fits[known], noise[found[known]], bias[known])
+    return Differences(found[known], fits[known], noise[found[known]], bias.T[known])
 
 
 def _block(points: Floats, lines: Lines, slope: Floats, at: Indices) -> tuple[Floats, Floats, Floats]:
@@ -185,16 +193,18 @@ def _block(points: Floats, lines: Lines, slope: Floats, at: Indices) -> tuple[Fl
         mixed.append(_sums(_ALL[:, 0::2], offset, slopes))
     left = np.where((way[1] - way[0]) & 3 == 1, 1.0, -1.0)  # counter-clockwise
     both = left * (mixed[0] + mixed[1]) / 2
-    by = []
+    shapes, by = [], []
     for k in range(3):
         X1, X2 = first[0][k], left * first[1][k]
         shape, frame, sides = shape_operator(X1, X2, second[0][k], both[k], second[1][k])
+        shapes.append(np.stack(shape))
         by.append(np.stack(invariants(*shape)))
     (a, b, c), (e1, e2, normal) = shape, frame
     angle = np.arctan2(b, (a - c) / 2) / 2
     cos, sin = np.cos(angle), np.sin(angle)
     directions = cos * e1 + sin * e2, cos * e2 - sin * e1
-    change = np.concatenate((by[1] - by[0], by[2] - by[1])).T ** 2
+    entries = np.array([1.0, 2.0, 1.0]) @ np.diff(shapes, axis=0) ** 2
+    change = np.concatenate((entries, (by[2] - by[1]) ** 2)).T
     gains = _gains(by[2], cos, sin, sides, near[0].offset, near[1].offset)
     return change, np.concatenate((by[2], *directions, normal)), gains
 
