@@ -141,9 +141,14 @@ def test_holes_are_open_sides(scheme, given):
     assert np.isnan(found[mask]).all()
     rim = np.zeros_like(mask)
     rim[5:16, 17:] = rim[5:16, 0] = True
-    np.testing.assert_allclose(found[~rim], whole[~rim], rtol=0, atol=1e-12)
     error = np.abs(found - H)
-    assert np.nanmax(error[rim]) < 30 * np.abs(whole - H).max()
+    if scheme == "jet":  # which looks along lines that end at the hole
+        assert np.nanmax(error) < 0.05
+        rim[:] = False
+        rim[2:19, 14:] = rim[2:19, :3] = True
+    else:
+        assert np.nanmax(error[rim]) < 30 * np.abs(whole - H).max()
+    np.testing.assert_allclose(found[~rim], whole[~rim], rtol=0, atol=1e-12)
     assert np.isfinite(found[7, 22])  # beside the hole, by ghosts
 
 

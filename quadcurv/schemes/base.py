@@ -301,7 +301,7 @@ class Fit:
     --------
     >>> import quadcurv as qc
     >>> qc.SCHEMES["jet"].order
-    6
+    8
     """
 
     name: str

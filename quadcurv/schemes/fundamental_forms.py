@@ -96,12 +96,12 @@ def shape_operator(X1: Floats, X2: Floats, X11: Floats, X12: Floats, X22: Floats
     from quadcurv.kernels import vector
 
     with np.errstate(divide="ignore", invalid="ignore"):
-        s, cross = np.sqrt(_dot(X1, X1)), np.stack(vector.cross(X1, X2))
-        area = np.sqrt(_dot(cross, cross))
+        s, cross = np.sqrt(dot(X1, X1)), np.stack(vector.cross(X1, X2))
+        area = np.sqrt(dot(cross, cross))
         normal, e1 = cross / area, X1 / s
         e2 = np.stack(vector.cross(normal, e1))
-        f, g = _dot(X2, e1), area / s
-        L, M, N = (_dot(X, normal) for X in (X11, X12, X22))
+        f, g = dot(X2, e1), area / s
+        L, M, N = (dot(X, normal) for X in (X11, X12, X22))
         h = f / s
         shape = -L / s**2, -(M - h * L) / (s * g), -(N - 2 * h * M + h * h * L) / g**2
         return shape, (e1, e2, normal), (s, f, g)
@@ -113,5 +113,6 @@ def invariants(a: Floats, b: Floats, c: Floats) -> tuple[Floats, Floats, Floats,
     return H, a * c - b * b, H + root, H - root
 
 
-def _dot(x: Floats, y: Floats) -> Floats:
+def dot(x: Floats, y: Floats) -> Floats:
+    """Of positions (3, ...)."""
     return x[0] * y[0] + x[1] * y[1] + x[2] * y[2]

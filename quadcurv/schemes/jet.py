@@ -80,7 +80,7 @@ def jet(degree: int | None = None, rings: int | None = None) -> Fit:
     if degree is None:
         if rings is not None:
             raise ValueError(f"rings: chosen vertex by vertex without a degree, got {rings!r}")
-        return Fit("jet", 6, _REFERENCE, chosen, REACH, POOLED)
+        return Fit("jet", 8, _REFERENCE, chosen, REACH, POOLED)
     if not isinstance(degree, int) or degree not in _CONDITION:
         raise ValueError(f"degree: expected one of {tuple(_CONDITION)}, got {degree!r}")
     if rings is None:

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from quadcurv.schemes.base import Neighbourhoods
-from quadcurv.schemes.fundamental_forms import invariants, shape_operator
+from quadcurv.schemes.fundamental_forms import dot, invariants, shape_operator
 from quadcurv.types import Bools, Floats, Indices, Ints
 
 if TYPE_CHECKING:
@@ -51,9 +51,9 @@ _ALL = _WEIGHTS.reshape(_POINTS, -1, _POINTS)
 _EIGHTH = np.broadcast_to(np.poly(np.ones(DEGREE)), (_POINTS, 1, _POINTS))
 _FIRST = np.concatenate((_WEIGHTS[:, -1, :1], _EIGHTH), axis=1)
 _LEAST_GAIN = np.linalg.norm(_WEIGHTS[_HALF, -1, 1]) / 2  # in H, times the square of the shorter edge
-# Each degree changes the entries of the shape operator by a like part of what the one before did, but for
-# lines on which one happens to change nothing: hence over so many rings, so many times that part, and H and the
-# others by so much of all entries at least.
+# Each degree changes the entries of the shape operator by a like part of what the one before did, but where
+# one happens to change nothing: hence over so many rings, so many times that part, and H and the others by so
+# much of all entries at least.
 _WIDE, _NEXT, _SHARE = 2, 3.0, 0.3
 # Square of what noise 1 is in the sum of both lines' eighth differences, less the means of neighbours.
 _OF_NOISE = 60729.1
@@ -76,7 +76,7 @@ class _Windows(NamedTuple):
     offset: Indices
 
 
-def _windows(lines: Lines, axis: int, vertices: Indices) -> _Windows:
+def _windows(lines: Lines, axis: int | Indices, vertices: Indices) -> _Windows:
     place = lines.place[axis, vertices]
     line = lines.line[place]
     begin, end, closed = lines.begin[line], lines.end[line], lines.closed[line]
@@ -149,22 +149,23 @@ def differences(around: Neighbourhoods, vertices: Indices, error: Floats) -> Dif
             near = _windows(lines, axis, at)
             slope[:, axis, at], eighth = _sums(_FIRST, near.offset, points.take(near.points, axis=1) - here)
             rough[:, at] += eighth
-    rough = rough.T
     for _ in range(_PASSES):
-        rough = rough - around.pooled(rough)
-    square = np.einsum("ij,ij->i", rough, rough)[:, None] / 3
+        rough = rough - around.pooled(rough.T).T
+    square = (dot(rough, rough) / 3)[:, None]
     for _ in range(_AROUND):
         square = around.pooled(square)
     noise = np.sqrt(square[:, 0] / _OF_NOISE)
 
-    shorter = np.einsum("jai,jai->ai", slope, slope).min(axis=0)[vertices]
-    found = vertices[noise[vertices] * _LEAST_GAIN < error * shorter]
+    # The line of the longer edges comes first, whichever the numbering begins with: so parts give the same.
+    edge2 = dot(slope, slope)
+    first = np.argmax(edge2, axis=0)
+    found = vertices[noise[vertices] * _LEAST_GAIN < error * edge2.min(axis=0)[vertices]]
     fits, change = np.full((found.size, kernel.COLUMNS), np.nan), np.full((n, 6), np.nan)
     fits[:, kernel.FREEDOM] = _FREEDOM
     for start in range(0, found.size, _AT_ONCE):
         at, out = found[start : start + _AT_ONCE], fits[start : start + _AT_ONCE].T
         change[at], out[: kernel.NORMAL.stop], out[kernel.GAIN : kernel.GAIN + 4] = _block(
-            points, lines, slope, at
+            points, lines, slope, at, (first[at], 1 - first[at])
         )
     for _ in range(_WIDE):
         change = around.pooled(change)
@@ -177,10 +178,12 @@ def differences(around: Neighbourhoods, vertices: Indices, error: Floats) -> Dif
     return Differences(found[known], fits[known], noise[found[known]], bias.T[known])
 
 
-def _block(points: Floats, lines: Lines, slope: Floats, at: Indices) -> tuple[Floats, Floats, Floats]:
+def _block(
+    points: Floats, lines: Lines, slope: Floats, at: Indices, axes: tuple[Indices, Indices]
+) -> tuple[Floats, Floats, Floats]:
     """Squares of what each degree changes; the first columns of `kernels.jet`; what noise makes of four."""
-    first, second, mixed, near = [], [], [], [_windows(lines, axis, at) for axis in range(2)]
-    way = [lines.ways[lines.place[axis, at]] for axis in range(2)]
+    first, second, mixed, near = [], [], [], [_windows(lines, axis, at) for axis in axes]
+    way = [lines.ways[lines.place[axis, at]] for axis in axes]
     for axis, (on, ways, offset) in enumerate(near):
         sums = _sums(_ALL, offset, points.take(on, axis=1) - points[:, at][:, None])
         first.append(sums[0::2])
@@ -203,7 +206,8 @@ def _block(points: Floats, lines: Lines, slope: Floats, at: Indices) -> tuple[Fl
     angle = np.arctan2(b, (a - c) / 2) / 2
     cos, sin = np.cos(angle), np.sin(angle)
     directions = cos * e1 + sin * e2, cos * e2 - sin * e1
-    entries = np.array([1.0, 2.0, 1.0]) @ np.diff(shapes, axis=0) ** 2
+    less, more = np.diff(shapes, axis=0)
+    entries = [x[0] ** 2 + 2 * x[1] ** 2 + x[2] ** 2 for x in (less, more)]
     change = np.concatenate((entries, (by[2] - by[1]) ** 2)).T
     gains = _gains(by[2], cos, sin, sides, near[0].offset, near[1].offset)
     return change, np.concatenate((by[2], *directions, normal)), gains
