@@ -162,13 +162,17 @@ def differences(around: Neighbourhoods, vertices: Indices, error: Floats) -> Dif
     found = vertices[noise[vertices] * _LEAST_GAIN < error * edge2.min(axis=0)[vertices]]
     fits, change = np.full((found.size, kernel.COLUMNS), np.nan), np.full((n, 6), np.nan)
     fits[:, kernel.FREEDOM] = _FREEDOM
+    middle = np.zeros(n, bool)
     for start in range(0, found.size, _AT_ONCE):
         at, out = found[start : start + _AT_ONCE], fits[start : start + _AT_ONCE].T
-        change[at], out[: kernel.NORMAL.stop], out[kernel.GAIN : kernel.GAIN + 4] = _block(
+        middle[at], change[at], out[: kernel.NORMAL.stop], out[kernel.GAIN : kernel.GAIN + 4] = _block(
             points, lines, slope, at, (first[at], 1 - first[at])
         )
+    # Near the ends of lines errors are tens of times as large, row by row: there nobody else's count.
+    inside = np.where(middle[:, None], change, np.nan)
     for _ in range(_WIDE):
-        change = around.pooled(change)
+        inside = around.pooled(inside)
+    change = np.where(middle[:, None], inside, change)
     before, behind, *each = np.sqrt(change[found]).T
     larger = np.abs(fits[:, kernel.K1 : kernel.K2 + 1]).max(axis=1)
     whole = behind * np.stack((np.ones_like(larger), larger, np.ones_like(larger), np.ones_like(larger)))
@@ -180,8 +184,8 @@ def differences(around: Neighbourhoods, vertices: Indices, error: Floats) -> Dif
 
 def _block(
     points: Floats, lines: Lines, slope: Floats, at: Indices, axes: tuple[Indices, Indices]
-) -> tuple[Floats, Floats, Floats]:
-    """Squares of what each degree changes; the first columns of `kernels.jet`; what noise makes of four."""
+) -> tuple[Bools, Floats, Floats, Floats]:
+    """Whether lines go on both ways; squares of what each degree changes; the first columns of `kernels.jet`; what noise makes of four."""
     first, second, mixed, near = [], [], [], [_windows(lines, axis, at) for axis in axes]
     way = [lines.ways[lines.place[axis, at]] for axis in axes]
     for axis, (on, ways, offset) in enumerate(near):
@@ -210,7 +214,8 @@ def _block(
     entries = [x[0] ** 2 + 2 * x[1] ** 2 + x[2] ** 2 for x in (less, more)]
     change = np.concatenate((entries, (by[2] - by[1]) ** 2)).T
     gains = _gains(by[2], cos, sin, sides, near[0].offset, near[1].offset)
-    return change, np.concatenate((by[2], *directions, normal)), gains
+    middle = (near[0].offset == _HALF) & (near[1].offset == _HALF)
+    return middle, change, np.concatenate((by[2], *directions, normal)), gains
 
 
 def _gains(by: Floats, cos: Floats, sin: Floats, sides: Any, first: Indices, second: Indices) -> Floats:
