@@ -185,7 +185,7 @@ def differences(around: Neighbourhoods, vertices: Indices, error: Floats) -> Dif
 def _block(
     points: Floats, lines: Lines, slope: Floats, at: Indices, axes: tuple[Indices, Indices]
 ) -> tuple[Bools, Floats, Floats, Floats]:
-    """Whether lines go on both ways; squares of what each degree changes; the first columns of `kernels.jet`; what noise makes of four."""
+    """Whether lines go on both ways; squares of what each degree changes; columns of a fit; its gains."""
     first, second, mixed, near = [], [], [], [_windows(lines, axis, at) for axis in axes]
     way = [lines.ways[lines.place[axis, at]] for axis in axes]
     for axis, (on, ways, offset) in enumerate(near):
