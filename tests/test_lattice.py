@@ -243,3 +243,22 @@ def test_masked_grids_have_lines():
     far[10:29, 10:31] = False
     assert (found.degree[far] == LINES).all()
     assert np.nanmax(np.abs(found.mean - exact)[far]) < 1e-7
+
+
+def test_cells_have_lines():
+    """Between the centres of a staggered grid, closed or not; its corners are not read."""
+    hyperboloid, torus, errors = surfaces.hyperboloid(), surfaces.torus(), []
+    for n in (16, 24, 32):
+        cells, xi, eta = hyperboloid.sample((n, n), "staggered")
+        open_ = np.abs(qc.mean_curvature(cells) - hyperboloid.mean_curvature(xi, eta)).max()
+        ends = np.arange(n + 1) * 2 * np.pi / n
+        corners = torus.mapping(*np.meshgrid(ends, ends, indexing="ij"))
+        xi, eta = np.meshgrid(ends[:-1] + np.pi / n, ends[:-1] + np.pi / n, indexing="ij")
+        closed = qc.StaggeredGrid(torus.mapping(xi, eta), corners, (True, True))
+        errors.append((open_, np.abs(qc.mean_curvature(closed) - torus.mean_curvature(xi, eta)).max()))
+    (*_, last_open), (*_, last_closed) = zip(*errors, strict=True)
+    assert last_open < 2e-5
+    assert last_closed < 6e-9
+    rates = [fitted_rate((16, 24, 32), each) for each in zip(*errors, strict=True)]
+    assert rates[0] > 6
+    assert rates[1] > 7.8

@@ -150,7 +150,8 @@ class MeshNeighbourhoods:
         """See `Neighbourhoods`."""
         from quadcurv.kernels.lines import lines
 
-        links, ends = self.stencils.links, ~self.present | (not self.stencils.orientable)
+        links = _across(self.mesh) if isinstance(self.mesh, StaggeredGrid) else self.stencils.links
+        ends = ~self.present | (not self.stencils.orientable)
         if ends.any():
             links = np.where(ends[links] | ends[:, None], np.int32(-1), links)
         return lines(links)
@@ -376,6 +377,16 @@ def _stencils(mesh: Mesh) -> tuple[Stencils, Bools]:
         kind = mesh.connectivity.kind
         present = (kind == topology.INTERIOR) | (kind == topology.BOUNDARY)
     return stencils, present
+
+
+def _across(grid: StaggeredGrid) -> Ints:
+    """(n, 4): the cells next to each, counter-clockwise, -1 where there is none."""
+    index = np.arange(grid.stencils().n, dtype=np.int32).reshape(grid.shape)
+    links = [np.roll(index, step, axis) for step, axis in ((-1, 0), (-1, 1), (1, 0), (1, 1))]
+    for axis, wraps in enumerate(grid.wrap):
+        if not wraps:
+            links[axis].swapaxes(0, axis)[-1] = links[axis + 2].swapaxes(0, axis)[0] = -1
+    return np.stack(links, axis=-1).reshape(-1, 4)
 
 
 def _padded(values: Floats, axis: int, wraps: bool, layers: int) -> Floats:
