@@ -5,7 +5,7 @@ terms of the points are made orthogonal (modified Gram-Schmidt, the heights as a
 stable as reflections: Bjorck 1967). What there is of every fit lies in rows of WIDTH numbers, see `moments`.
 """
 
-from math import nan
+from math import inf, nan
 
 import numpy as np
 
@@ -104,22 +104,6 @@ def weighted(P, lane, size, out, rows):
     put_row(lane, MOST, 0.0)
 
 
-def project(rows, size, k, j, upper, zero, before):
-    """Make the columns from j on that follow column k orthogonal to it; what `before` does comes first."""
-    sums = Carried((zero,) * TALL)
-    for m in span(1, size):
-        x = before(m)
-        sums.set(tuple(s + x * row(rows, COLUMNS * m + j + i) for i, s in enumerate(sums.get())))
-    sums = sums.get()
-    for m in span(1, size):
-        x = row(rows, COLUMNS * m + k)
-        for i, s in enumerate(sums):
-            at = COLUMNS * m + j + i
-            put_row(rows, at, where(j + i > k, row(rows, at) - x * s, row(rows, at)))
-    for i, s in enumerate(sums):
-        put_row(upper, COLUMNS * k + j + i, s)
-
-
 @step()
 def factor(rows, size, T, groups, upper, lane):
     """Make the first T columns orthonormal, and leave of the last one what is orthogonal to them.
@@ -129,29 +113,37 @@ def factor(rows, size, T, groups, upper, lane):
     last, zero = COLUMNS - 1, 0.0 * row(lane, COUNT)
     for t in span(0, groups):
         j = TALL * t
-        for k in span(0, j):
-            project(rows, size, k, j, upper, zero, lambda m, k=k: row(rows, COLUMNS * m + k))
-        for k in span(j, j + TALL):
-            sums = Carried((zero, zero))
+        for k in span(0, j + TALL):
+            for _ in span(0, where(k < j, 0, 1)):  # a column of this group: its turn to be made normal
+                sums = Carried((zero, zero))
+                for m in span(1, size):
+                    x, (square, height) = row(rows, COLUMNS * m + k), sums.get()
+                    sums.set((square + x * x, height + x * row(rows, COLUMNS * m + last)))
+                square, height = sums.get()
+                norm, least, most = root(square), row(lane, LEAST), row(lane, MOST)
+                inverse = 1.0 / where(norm > 0, norm, 1.0)
+                height = where(k < T, height * inverse, 0.0)  # of columns beyond the terms nothing is left
+                put_row(lane, LEAST, where(k < T, where(norm < least, norm, least), least))
+                put_row(lane, MOST, where(k < T, where(norm > most, norm, most), most))
+                for m in span(1, size):
+                    x = row(rows, COLUMNS * m + k) * inverse
+                    put_row(rows, COLUMNS * m + k, x)
+                    put_row(rows, COLUMNS * m + last, row(rows, COLUMNS * m + last) - x * height)
+                put_row(upper, COLUMNS * k + k, norm)
+                put_row(upper, COLUMNS * k + last, height)
+            sums = Carried((zero,) * TALL)
             for m in span(1, size):
-                x, (square, height) = row(rows, COLUMNS * m + k), sums.get()
-                sums.set((square + x * x, height + x * row(rows, COLUMNS * m + last)))
-            square, height = sums.get()
-            norm, least, most = root(square), row(lane, LEAST), row(lane, MOST)
-            inverse = 1.0 / where(norm > 0, norm, 1.0)
-            height = where(k < T, height * inverse, 0.0)  # of columns beyond the terms nothing is left
-            put_row(lane, LEAST, where(k < T, where(norm < least, norm, least), least))
-            put_row(lane, MOST, where(k < T, where(norm > most, norm, most), most))
-
-            def normal(m, k=k, inverse=inverse, height=height):
-                x = row(rows, COLUMNS * m + k) * inverse
-                put_row(rows, COLUMNS * m + k, x)
-                put_row(rows, COLUMNS * m + last, row(rows, COLUMNS * m + last) - x * height)
-                return x
-
-            project(rows, size, k, j, upper, zero, normal)
-            put_row(upper, COLUMNS * k + k, norm)
-            put_row(upper, COLUMNS * k + last, height)
+                x = row(rows, COLUMNS * m + k)
+                sums.set(tuple(s + x * row(rows, COLUMNS * m + j + i) for i, s in enumerate(sums.get())))
+            sums = sums.get()
+            for m in span(1, size):
+                x = row(rows, COLUMNS * m + k)
+                for i, s in enumerate(sums):
+                    at = COLUMNS * m + j + i
+                    put_row(rows, at, where(j + i > k, row(rows, at) - x * s, row(rows, at)))
+            for i, s in enumerate(sums):
+                at = COLUMNS * k + j + i
+                put_row(upper, at, where(j + i > k, s, row(upper, at)))
 
 
 @step()
@@ -246,44 +238,65 @@ def rooted(lane, out):
     put_row(out, BEND, root(row(out, BEND)))
 
 
+@formula
+def put_neighbourhood(
+    points, areas, orientable, around, ring, room, frames, degrees, rings, at, k, P, lane, counts,
+):  # fmt: skip
+    """Write the points around a vertex, in its frame, into a column; how many of them each fit has, or 0."""
+    base, frame, n, c = room * at, 9 * at, areas.size, around[room * at]
+    axes = [[frames[frame + 3 * i + a] for a in range(3)] for i in range(3)]
+    found = Carried((room + 1, 0))
+    for m in span(0, room):
+        is_there = around[base + m] >= 0
+        v, (steep, first) = where(is_there, around[base + m], c), found.get()
+        d = [points[3 * v + a] - points[3 * c + a] for a in range(3)]
+        for i, (x, y, z) in enumerate(axes):
+            P[(POINT * m + i) * WIDTH + k] = x * d[0] + y * d[1] + z * d[2]
+        is_seen = is_there & (m > 0) & (3 * v < n)
+        at_v = where(is_seen, 3 * v, 0)
+        d, e, f = areas[at_v], areas[at_v + 1], areas[at_v + 2]
+        x, y, z = axes[2]
+        up = d * x + e * y + f * z
+        up = where(orientable | (up >= 0), up, -up)
+        is_steep = is_seen & (up < STEEP * root(d * d + e * e + f * f)) & (m < steep)
+        is_first = is_there & (ring[base + m] <= 1)
+        found.set((where(is_steep, m, steep), first + where(is_first, 1, 0)))
+    steep, first = found.get()
+    lane[WIDTH * FIRST + k] = real(first)
+    for i in span(0, degrees.size):
+        size, degree = Carried((0,)), degrees[i]
+        for m in span(0, room):
+            is_near = (around[base + m] >= 0) & (ring[base + m] <= rings[i])
+            size.set((size.get()[0] + where(is_near, 1, 0),))
+        (size,) = size.get()
+        is_enough = size >= (((degree + 1) * (degree + 2)) >> 1) + SPARE
+        is_followed = ((degree <= 2) | (steep >= size)) & (axes[2][0] == axes[2][0])
+        counts[WIDTH * i + k] = where(is_enough & is_followed, size, 0)
+
+
+@formula
+def put_results(out, lane, counts, fits, i, begin, stop, found):
+    """Results of a block, of vertices from `begin` on."""
+    for k in span(0, where(stop - begin < WIDTH, stop - begin, WIDTH)):
+        at, is_known = ((begin + k) * fits + i) * RESULTS, counts[WIDTH * i + k] > 0
+        is_known = is_known & (lane[WIDTH * WELL + k] > 0)
+        for j in span(0, RESULTS):
+            found[at + j] = where(is_known, out[WIDTH * j + k], nan)
+
+
 @kernel
 def _fits(
     points, areas, orientable, around, ring, room, frames, degrees, rings, found, start, stop,
     P, lane, out, rows, upper, inverse, own, counts,
 ):  # fmt: skip
-    n, fits = areas.size // 3, degrees.size
+    fits = degrees.size
     for begin in range(start, stop, WIDTH):
-        for k in range(WIDTH):  # the last one again where there are fewer
-            at = min(begin + k, stop - 1)
-            base, frame, c = room * at, 9 * at, 3 * around[room * at]
-            size, steep, first = 0, room + 1, 0
-            for i in range(fits):
-                counts[WIDTH * i + k] = 0
-            while size < room and around[base + size] >= 0:
-                v, r, p = around[base + size], ring[base + size], POINT * WIDTH * size + k
-                d, e = points[3 * v] - points[c], points[3 * v + 1] - points[c + 1]
-                f = points[3 * v + 2] - points[c + 2]
-                for a in range(frame, frame + 9, 3):
-                    P[p] = frames[a] * d + frames[a + 1] * e + frames[a + 2] * f
-                    p += WIDTH
-                if v < n and size > 0:
-                    d, e, f = areas[3 * v], areas[3 * v + 1], areas[3 * v + 2]
-                    up = d * frames[frame + 6] + e * frames[frame + 7] + f * frames[frame + 8]
-                    up = up if orientable else abs(up)
-                    if up < STEEP * np.sqrt(d * d + e * e + f * f):
-                        steep = min(steep, size)
-                size += 1
-                first += r <= 1
-                for i in range(fits):
-                    counts[WIDTH * i + k] += r <= rings[i]
-            lane[WIDTH * FIRST + k] = first
-            for i in range(fits):
-                size, degree = counts[WIDTH * i + k], degrees[i]
-                good = size >= (degree + 1) * (degree + 2) // 2 + SPARE and (degree <= 2 or steep >= size)
-                if not good or frames[frame + 6] - frames[frame + 6] != 0:
-                    counts[WIDTH * i + k] = 0
         most = 0
-        for k in range(WIDTH):
+        for k in range(WIDTH):  # the last one again where there are fewer
+            put_neighbourhood(
+                points, areas, orientable, around, ring, room, frames, degrees, rings,
+                min(begin + k, stop - 1), k, P, lane, counts,
+            )  # fmt: skip
             most = max(most, int(lane[WIDTH * FIRST + k]))
         for i in range(fits):
             size, T = 0, (degrees[i] + 1) * (degrees[i] + 2) // 2 - 1
@@ -302,11 +315,7 @@ def _fits(
                     mirror_terms(P, m, own)
                     reached(own, rows, inverse, size, T, lane, out, GAIN, float(m))
                 rooted(lane, out)
-            for k in range(min(WIDTH, stop - begin)):
-                at = ((begin + k) * fits + i) * RESULTS
-                known = counts[WIDTH * i + k] > 0 and lane[WIDTH * WELL + k] > 0
-                for j in range(RESULTS):
-                    found[at + j] = out[WIDTH * j + k] if known else nan
+            put_results(out, lane, counts, fits, i, begin, stop, found)
 
 
 def fits(points, areas, orientable, around, ring, frames, degrees, rings):
@@ -344,10 +353,12 @@ def fits(points, areas, orientable, around, ring, frames, degrees, rings):
     return found
 
 
-@formula
-def height(coefficients, first, u, v):
+def value_at(u, v, coefficients, first):
     """Value of a polynomial."""
     return sum(coefficients[first + t] * term for t, term in enumerate(terms_at(u, v)))
+
+
+height = formula(value_at)
 
 
 @kernel
@@ -356,7 +367,7 @@ def _lifted(maps, coefficients, x, size, z):
         at = k // size
         a, b, c, d = maps[4 * at], maps[4 * at + 1], maps[4 * at + 2], maps[4 * at + 3]
         u, v = x[2 * k], x[2 * k + 1]
-        z[k] = height(coefficients, len(TERMS) * at, a * u + b * v, c * u + d * v)
+        z[k] = height(a * u + b * v, c * u + d * v, coefficients, len(TERMS) * at)
 
 
 def lifted(maps, coefficients, x):
@@ -366,49 +377,58 @@ def lifted(maps, coefficients, x):
     return z
 
 
+def nearest(x, count, u, v, but):
+    """Square of the distance from a point of the plane to the nearest of some, all but one."""
+    least = Carried((inf,))
+    for j in span(0, count):
+        d, e = x[2 * j] - u, x[2 * j + 1] - v
+        square = d * d + e * e
+        least.set((where((j != but) & (square < least.get()[0]), square, least.get()[0]),))
+    return least.get()[0]
+
+
+@formula
+def mirror(points, around, ring, room, rings, frames, maps, coefficients, share, x, out, size, k):
+    """Write the points of the rings around a vertex and their mirror images behind each other; how many."""
+    base, first, to = room * k, 3 * around[room * k], 3 * size * k
+    axes = [[frames[9 * k + 3 * i + a] for a in range(3)] for i in range(3)]
+    number, spacing = Carried((0,)), Carried((0.0,))
+    for m in span(0, room):
+        is_there = (around[base + m] >= 0) & (ring[base + m] <= rings)  # ring after ring
+        for _ in span(0, where(is_there, 1, 0)):
+            v = 3 * around[base + m]
+            d, e, f = (points[v + a] - points[first + a] for a in range(3))
+            for a, (p, q, r) in enumerate(axes[:2]):
+                x[2 * m + a] = p * d + q * e + r * f
+            for a in range(3):
+                out[to + 3 * m + a] = points[v + a]
+            number.set((m + 1,))
+    (count,) = number.get()
+    for i in span(0, count):
+        spacing.set((spacing.get()[0] + root(nearest(x, count, x[2 * i], x[2 * i + 1], i)),))
+    free = spacing.get()[0] * (share / real(count))
+    a, b, c, d = (maps[4 * k + i] for i in range(4))
+    for i in span(0, count):
+        u, v = -x[2 * i], -x[2 * i + 1]
+        w = value_at(a * u + b * v, c * u + d * v, coefficients, len(TERMS) * k)
+        (m,) = number.get()
+        for j in range(3):
+            p, q, r = (axes[axis][j] for axis in range(3))
+            out[to + 3 * m + j] = points[first + j] + p * u + q * v + r * w
+        is_free = (nearest(x, count, u, v, -1) > free * free) & (w - w == 0)
+        number.set((m + where(is_free, 1, 0),))
+    (m,) = number.get()
+    for i in span(3 * m, 3 * size):
+        out[to + i] = nan
+    return m
+
+
 @kernel
 def _mirrored(points, around, ring, room, rings, frames, maps, coefficients, share, x, out, size, counts):
     for k in range(counts.size):
-        base, frame, first, end = room * k, 9 * k, 3 * around[room * k], 3 * size * k
-        count, spacing, found = 0, 0.0, 0
-        while count < room and around[base + count] >= 0 and ring[base + count] <= rings:
-            v = 3 * around[base + count]
-            d, e = points[v] - points[first], points[v + 1] - points[first + 1]
-            f = points[v + 2] - points[first + 2]
-            for a in range(2):
-                i = frame + 3 * a
-                x[2 * count + a] = frames[i] * d + frames[i + 1] * e + frames[i + 2] * f
-            for a in range(3):
-                out[end + a] = points[v + a]
-            count, end = count + 1, end + 3
-        for i in range(count):
-            least = np.inf
-            for j in range(count):
-                d, e = x[2 * i] - x[2 * j], x[2 * i + 1] - x[2 * j + 1]
-                if i != j and d * d + e * e < least:
-                    least = d * d + e * e
-            spacing += np.sqrt(least)
-        spacing *= share / count
-        for i in range(count):
-            u, v = -x[2 * i], -x[2 * i + 1]
-            least = np.inf
-            for j in range(count):
-                d, e = x[2 * j] - u, x[2 * j + 1] - v
-                if d * d + e * e < least:
-                    least = d * d + e * e
-            if least > spacing * spacing:
-                a, b, c, d = maps[4 * k], maps[4 * k + 1], maps[4 * k + 2], maps[4 * k + 3]
-                w = height(coefficients, len(TERMS) * k, a * u + b * v, c * u + d * v)
-                if w - w == 0:
-                    for a in range(3):
-                        i = frame + a
-                        out[end + a] = (
-                            points[first + a] + frames[i] * u + frames[i + 3] * v + frames[i + 6] * w
-                        )
-                    end, found = end + 3, found + 1
-        counts[k] = count + found
-        for a in range(end, 3 * size * (k + 1)):
-            out[a] = nan
+        counts[k] = mirror(
+            points, around, ring, room, rings, frames, maps, coefficients, share, x, out, size, k
+        )
 
 
 def mirrored(points, around, ring, rings, frames, maps, coefficients, share):
