@@ -5,17 +5,25 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 
+import numpy as np
+
 from quadcurv import drivers
 from quadcurv.boundary import one_rings
 from quadcurv.drivers import parts
+from quadcurv.drivers.direct import FarOff
 from quadcurv.drivers.dispatch import as_fit, fitted, results, split, taken
 from quadcurv.mesh import ChunkedGrid, GridBlocks
 from quadcurv.schemes import Curvatures, Fit, Scheme, SchemeName, as_scheme
 from quadcurv.schemes.angle_defect import gaussian_curvature as angle_gaussian_curvature
+from quadcurv.schemes.consistency import far_off
+from quadcurv.schemes.cotan import cotan
 from quadcurv.types import Floats
 
 DEFAULT = "jet"
 """Scheme of H, K, k1 and k2 where none is named, so that H = (k1 + k2) / 2."""
+
+
+_COTAN = cotan(6)
 
 
 class PrincipalCurvatures(NamedTuple):
@@ -251,7 +259,13 @@ def gaussian_curvature(
         raise ValueError("scheme: angle_defect does not run on a device; give it positions in memory")
     if isinstance(mesh, GridBlocks):
         return split(mesh, angle_gaussian_curvature(one_rings(mesh.mesh, boundary))[: mesh.n])
-    return mesh.in_shape(angle_gaussian_curvature(one_rings(mesh, boundary)))
+    stencils = one_rings(mesh, boundary)
+    # On triangles as skew as make the cotan formula far off angles tell no curvature either.
+    K = angle_gaussian_curvature(stencils)
+    far = FarOff(*far_off(stencils, _COTAN)).known(K)
+    place = np.flatnonzero(mesh.in_shape(np.ones(stencils.n, bool)))
+    far._replace(vertices=place[far.vertices]).warn("angle_defect: K", mesh.in_shape(K).shape)
+    return mesh.in_shape(K)
 
 
 def vertex_normals(mesh: Any, boundary: str = "extrapolate") -> Floats:

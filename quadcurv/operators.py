@@ -178,7 +178,7 @@ def laplace_beltrami(mesh: Any, f: ArrayLike, scheme: SchemeName | str | Scheme 
         raise ValueError(f"f: shape {given.shape}, expected {lead} or {(*lead, 'k')}")
     values = given.reshape(len(stencils.points), *given.shape[len(lead) :])
     result = drivers.apply(mesh, chosen, values)
-    FarOff(*far_off(stencils, chosen)).warn(chosen, stencils.shape)
+    FarOff(*far_off(stencils, chosen)).known(result).warn(f"{chosen.name}: the operator", stencils.shape)
     return split(mesh, result.reshape(*stencils.shape, *values.shape[1:]))
 
 

@@ -86,18 +86,23 @@ def warn_of_error(error: float, extent: float, roundoff: float, H: Floats) -> No
     """The same of an error that is known, with some of the values of H."""
     if error * extent < _NOTED:  # most meshes: nothing of H needs to be looked at
         return
+    usual = typical(H, extent)
+    if error >= _NOTED * usual:
+        warn(
+            f"positions are rounded to {2 * roundoff:.1e} of their size, which causes errors of about "
+            f"{error:.1g} (1/length) in H, where H is about {usual:.1g}: move the mesh near the origin "
+            "and give double precision, or smooth more",
+            PrecisionWarning,
+        )
+
+
+def typical(H: Floats, extent: float) -> float:
+    """Median size of the mean curvature, of some of its values, or 1 / extent where that is larger."""
     values = H.reshape(-1)
     every = values.size // _VALUES + 1
     H = on_host(values[:: every + (every % 3 == 0)])  # of vectors each coordinate in turn
     known = np.abs(H[np.isfinite(H)])
-    typical = max(float(np.median(known)) if known.size else 0.0, 1 / extent)
-    if error >= _NOTED * typical:
-        warn(
-            f"positions are rounded to {2 * roundoff:.1e} of their size, which causes errors of about "
-            f"{error:.1g} (1/length) in H, where H is about {typical:.1g}: move the mesh near the origin "
-            "and give double precision, or smooth more",
-            PrecisionWarning,
-        )
+    return max(float(np.median(known)) if known.size else 0.0, 1 / extent)
 
 
 def sample(r: int, c: int) -> tuple[Indices, Indices]:

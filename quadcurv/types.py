@@ -65,7 +65,8 @@ class ConsistencyWarning(MeshWarning):
     """Faces are so skew that a scheme is far off the mean curvature there, whatever the surface.
 
     Told where H may be off by more than three times the larger principal curvature for this alone, six times
-    of schemes that converge on no skew mesh (valence 4 and 8).
+    of schemes that converge on no skew mesh (valence 4 and 8); where rounding makes as much, in 1 / extent;
+    and where faces fold over each other.
 
     Examples
     --------

@@ -264,6 +264,7 @@ def test_all_paths_agree_on_rings_at_the_threshold(scheme, rng):
     assert apart <= 1
 
 
+@skew
 @each_laplacian
 @pytest.mark.parametrize(
     ("scale", "offset"), [(1.0, 0.0), (1e-6, 1e-6), (1e6, 1e6), (3.0, 3.0), (1.0, 100.0)]

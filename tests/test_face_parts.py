@@ -260,6 +260,7 @@ def test_progress_is_shown(tmp_path, capsys):
     assert "parts" in capsys.readouterr().err
 
 
+@pytest.mark.filterwarnings("ignore::quadcurv.ConsistencyWarning")
 @pytest.mark.filterwarnings("ignore::quadcurv.PrecisionWarning")
 def test_slivers_of_rounded_positions(tmp_path):
     """No area but for the rounding of its positions, however far those of other parts are."""

@@ -9,7 +9,7 @@ import numpy as np
 import scipy
 
 from quadcurv.boundary import checked_boundary, one_rings
-from quadcurv.drivers import blocks, compiled, device, direct, fits
+from quadcurv.drivers import blocks, compiled, device, direct, fits, outliers
 from quadcurv.drivers.answers import shapes
 from quadcurv.drivers.averages import averaged, checked_radius
 from quadcurv.drivers.fits import each
@@ -55,8 +55,10 @@ def run(
     checked_boundary(boundary)
     results = arrays(mesh, scheme, wanted, out)
     far = _evaluate(mesh, scheme, boundary, results)
+    if tell and scheme.fast is not None and not isinstance(mesh, GridBlocks) and not has_holes(mesh):
+        far = far.joined(outliers.far_off_inside(mesh, scheme, results))
     if tell and far.vertices.size:
-        far.warn(scheme, mesh.shape if isinstance(mesh, QuadGrid) else mesh.stencils().shape)
+        far.warn(f"{scheme.name}: H", mesh.shape if isinstance(mesh, QuadGrid) else mesh.stencils().shape)
     if _of_cells(mesh) and "dual_areas" in results:
         results["dual_areas"] *= _CELLS
     return results

@@ -36,8 +36,17 @@ class FarOff(NamedTuple):
         at = row[self.vertices]
         return FarOff(at[at >= 0], self.off[at >= 0])
 
-    def warn(self, scheme: Laplacian, shape: tuple[int, ...]) -> None:
-        """Name the first one, and how many there are.
+    def known(self, values: Floats) -> FarOff:
+        """Those where values (n, ...) are finite."""
+        kept = np.isfinite(values.reshape(len(values), -1)[self.vertices]).all(axis=1)
+        return FarOff(self.vertices[kept], self.off[kept])
+
+    def joined(self, other: FarOff) -> FarOff:
+        """Both."""
+        return FarOff(np.concatenate((self.vertices, other.vertices)), np.concatenate((self.off, other.off)))
+
+    def warn(self, name: str, shape: tuple[int, ...]) -> None:
+        """Name the first one, and how many there are, and what is off.
 
         Warns
         -----
@@ -46,10 +55,18 @@ class FarOff(NamedTuple):
         if not self.vertices.size:
             return
         first = tuple(map(int, np.unravel_index(self.vertices.min(), shape)))
+        folds = np.count_nonzero(np.isinf(self.off))
+        said = []
+        if folds < self.off.size:
+            said.append(
+                f"by up to {self.off[np.isfinite(self.off)].max():.2g} times the larger principal curvature "
+                f"at {self.off.size - folds} vertices of faces too skew or too thin for it"
+            )
+        if folds:
+            said.append(f"by any amount at {folds} vertices whose faces fold over each other or have no area")
         warn(
-            f"{scheme.name}: H may be off by up to {self.off.max():.2g} times the larger principal curvature "
-            f"at {self.vertices.size} vertices of faces too skew for it, first vertex "
-            f"{first if len(first) > 1 else first[0]}; 'jet' does not depend on faces",
+            f"{name} may be off {' and '.join(said)}, first vertex {first if len(first) > 1 else first[0]}; "
+            "'jet' does not depend on faces",
             ConsistencyWarning,
         )
 
@@ -77,7 +94,7 @@ def evaluate(given: Stencils, treated: Stencils, scheme: Laplacian, results: Map
     if "mean_curvature" in results:
         H = -np.einsum("ix,ix->i", Hn, normals)
         results["mean_curvature"][...] = (H if treated.orientable else np.abs(H)).reshape(treated.shape)
-    return FarOff(*far_off(treated, scheme))
+    return FarOff(*far_off(treated, scheme)).known(Hn)
 
 
 def flux_and_area(stencils: Stencils, scheme: Laplacian) -> tuple[Floats, Floats]:

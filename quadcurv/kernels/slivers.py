@@ -1,10 +1,12 @@
-"""Faces with two edges that run along each other."""
+"""Faces with two edges that run along each other, and faces that fold over."""
 
 import numpy as np
 
 from quadcurv.kernels.compiled import flat, kernel
 from quadcurv.kernels.formulas import formula, where
 from quadcurv.kernels.vector import cross, dot, less, triple
+
+_SMALL = 1e-6  # an area, over the squares of the edges: which way such a face lies is by chance
 
 
 @formula
@@ -45,4 +47,37 @@ def beside_slivers(points, faces, least):
     """
     marked = np.zeros(len(points), np.bool_)
     _mark(flat(points), flat(faces), least**2, marked)
+    return marked
+
+
+@formula
+def normal_of(points, faces, f, least):
+    """Twice the vector area of a face, none if it is small, and how many of its corners are turned away."""
+    v = [faces[4 * f + s] for s in range(4)]
+    a, b, c, d = (triple(points, 3 * i, 1) for i in (*v[:3], where(v[3] < 0, v[0], v[3])))
+    side, edges = cross(less(c, a), less(d, b)), (less(b, a), less(c, b), less(d, c), less(a, d))
+    size = dot(edges[0], edges[0]) + dot(edges[1], edges[1]) + dot(edges[2], edges[2])
+    number, least = 0, least * (size * size)
+    for ahead, behind in zip(edges, edges[-1:] + edges[:-1], strict=True):
+        number = number + where(dot(cross(behind, ahead), side) < -1 * least, 1, 0)
+    large = dot(side, side) > least
+    return *(where(large, x, 0.0) for x in side), number
+
+
+@kernel
+def _mark_folds(points, faces, areas, least, marked):
+    n = areas.size // 3
+    for f in range(faces.size // 4):
+        x, y, z, turned = normal_of(points, faces, f, least)
+        for s in range(4):
+            v = faces[4 * f + s]
+            if 0 <= v < n:
+                up = x * areas[3 * v] + y * areas[3 * v + 1] + z * areas[3 * v + 2]
+                marked[v] |= up < 0 or turned > 1
+
+
+def at_folds(points, faces, areas):
+    """(n,): vertices of a face that crosses itself, or is turned away from the ring's vector area (n, 3)."""
+    marked = np.zeros(len(areas), np.bool_)
+    _mark_folds(flat(points), flat(faces), flat(areas), _SMALL**2, marked)
     return marked

@@ -12,7 +12,7 @@ import numpy as np
 
 from quadcurv.schemes.base import Laplacian
 from quadcurv.stencils import Stencils
-from quadcurv.types import Floats, Indices
+from quadcurv.types import Bools, Floats, Indices
 
 FAR = 3.0  # times the larger principal curvature: jitter of 30 % of the spacing makes H as far off
 FAR_ANYHOW = 6.0  # of a scheme that converges on no skew mesh
@@ -33,11 +33,12 @@ def consistency(stencils: Stencils, scheme: Laplacian, vertices: Indices | None 
     Returns
     -------
     (k,) or (n,) float64
-        Half the sum of the sizes of the eigenvalues of T - 1, see this module; NaN in open rings, and where
-        the scheme has no value.
+        Half the sum of the sizes of the eigenvalues of T - 1, see this module, and what the rounding of the
+        positions makes H be off by, in 1 / extent; NaN in open rings, and where the scheme has no value.
     """
     rows = np.arange(stencils.n) if vertices is None else vertices
-    part = stencils if vertices is None else _around(stencils, scheme, vertices)
+    whole = vertices is None or (scheme.polygons and stencils.polygons is not None)
+    part = stencils if whole else around(stencils, rows)
     at = rows if part is stencils else np.arange(rows.size)
     with np.errstate(all="ignore"):
         S, A = scheme.assemble(part)
@@ -52,31 +53,47 @@ def consistency(stencils: Stencils, scheme: Laplacian, vertices: Indices | None 
             for j in range(i, 3):
                 sums = np.bincount(row, S.data * x[:, i] * x[:, j], at.size)
                 off[:, i, j] = off[:, j, i] = -sums / (2 * A) - (i == j) + normal[:, i] * normal[:, j]
+        extent = np.ptp(stencils.points[: stencils.n], axis=0).max()
+        far = np.abs(part.points[at]).max(axis=1)
+        rounded = np.bincount(row, np.abs(S.data), at.size) * part.roundoff * far * extent / (2 * A)
     known = stencils.closed[rows] & (A > 0) & np.isfinite(off).all(axis=(1, 2))
     sizes = np.full(rows.size, np.nan)
-    sizes[known] = np.abs(np.linalg.eigvalsh(off[known])).sum(axis=1) / 2
+    sizes[known] = np.abs(np.linalg.eigvalsh(off[known])).sum(axis=1) / 2 + rounded[known]
     return sizes
 
 
 def far_off(stencils: Stencils, scheme: Laplacian) -> tuple[Indices, Floats]:
-    """Vertices where H of a scheme may be far off for their rings, and by how much: see `consistency`."""
+    """Vertices where H of a scheme may be far off for their rings, and by how much: see `consistency`.
+
+    Infinite where faces fold over each other, and in rings without area: these are none of a surface over a
+    plane.
+    """
     from quadcurv.kernels.slivers import beside_slivers
 
+    off = np.where(folded(stencils), np.inf, 0.0)
     marked = beside_slivers(stencils.points, stencils.faces, _SLIVER)[: stencils.n]
-    vertices = np.flatnonzero(marked & stencils.closed)
-    if not vertices.size:
-        return vertices, np.empty(0)
-    off = consistency(stencils, scheme, vertices)
-    far = off > (FAR if scheme.order > 0 else FAR_ANYHOW)
-    return vertices[far], off[far]
+    vertices = np.flatnonzero(marked & stencils.closed & (off == 0))
+    if vertices.size:
+        found = consistency(stencils, scheme, vertices)
+        without_area = np.isnan(found) & ~stencils.ring_areas[vertices].any(axis=1)
+        off[vertices] = np.where(without_area, np.inf, np.nan_to_num(found))
+    far = np.flatnonzero(off > (FAR if scheme.order > 0 else FAR_ANYHOW))
+    return far, off[far]
 
 
-def _around(stencils: Stencils, scheme: Laplacian, vertices: Indices) -> Stencils:
-    """Stencils of some vertices, these first; all where polygons are looked at as such."""
+def folded(stencils: Stencils) -> Bools:
+    """(n,): vertices with a closed ring of which some faces lie over others."""
+    from quadcurv.kernels.slivers import at_folds
+
+    if not stencils.orientable:
+        return np.zeros(stencils.n, bool)
+    return np.asarray(at_folds(stencils.points, stencils.faces, stencils.ring_areas) & stencils.closed)
+
+
+def around(stencils: Stencils, vertices: Indices) -> Stencils:
+    """Stencils of some vertices alone."""
     from quadcurv.kernels import topology
 
-    if scheme.polygons and stencils.polygons is not None:
-        return stencils
     kept, faces = topology.part_around(stencils.faces, vertices, len(stencils.points), 1)
     closed, shape = stencils.closed[vertices], vertices.shape
     points, orientable = stencils.points[kept], stencils.orientable
