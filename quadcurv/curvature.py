@@ -264,7 +264,9 @@ def gaussian_curvature(
     K = angle_gaussian_curvature(stencils)
     far = FarOff(*far_off(stencils, _COTAN)).known(K)
     place = np.flatnonzero(mesh.in_shape(np.ones(stencils.n, bool)))
-    far._replace(vertices=place[far.vertices]).warn("angle_defect: K", mesh.in_shape(K).shape)
+    far._replace(vertices=place[far.vertices]).warn(
+        "angle_defect: K, as H by cotan-6,", mesh.in_shape(K).shape
+    )
     return mesh.in_shape(K)
 
 

@@ -85,6 +85,8 @@ def lone_faces(s, rng):
     """A few faces, most of them alone: nothing is known of any curvature."""
     faces = faces_of(s)
     chosen = [faces[k] for k in rng.choice(len(faces), rng.integers(1, 5), replace=False)]
+    while np.bincount(np.ravel(chosen)).max() > 2:  # three about a vertex tell of one
+        chosen = [faces[k] for k in rng.choice(len(faces), rng.integers(1, 5), replace=False)]
     return Damaged(s.points.reshape(-1, 3), lambda x: qc.QuadMesh(x, chosen), np.full(s.xi.size, np.inf))
 
 

@@ -233,7 +233,7 @@ def test_what_folds_over_or_has_no_width_is_told(given_as, name):
 )
 def test_angle_defects_at_folds_are_told(shape):
     points, _ = sheet(*SHAPES[shape])
-    with pytest.warns(qc.ConsistencyWarning, match=r"angle_defect: K may be off .* vertex \(\d+, \d+\)"):
+    with pytest.warns(qc.ConsistencyWarning, match=r"angle_defect: K, as .* vertex \(\d+, \d+\)"):
         K = qc.gaussian_curvature(qc.QuadGrid(points), "angle_defect")
     with warnings.catch_warnings():
         warnings.simplefilter("error")

@@ -740,6 +740,7 @@ def test_threads_do_not_change_a_bit():
 # ---- angle defect ---------------------------------------------------------------------------------------
 
 
+@pytest.mark.filterwarnings("ignore::quadcurv.ConsistencyWarning")
 @pytest.mark.parametrize(("name", "euler"), [("cubed_sphere", 2), ("cubed_ellipsoid", 2), ("torus", 0)])
 def test_gauss_bonnet(name, euler):
     """Angle defects sum to 2 pi chi, to rounding, on any closed mesh."""

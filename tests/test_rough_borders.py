@@ -24,6 +24,10 @@ DAMAGES = [
     ("first cells", 0.3), ("first cells", 0.5), ("first cells", 0.7), ("first cells", 1.5),
     ("first cells", 2.0),
 ]  # fmt: skip
+# What is nearly exact inside a minimal surface on conformal grids is no measure of a one-sided fit.
+ON_MINIMAL = {
+    ("enneper", 0.3): 4.6, ("enneper", 2.0): 3.1, ("catenoid", 1.5): 4.3, ("catenoid", 2.0): 7.0,
+}  # fmt: skip
 LAPLACIANS = [name for name, scheme in SCHEMES.items() if isinstance(scheme, Laplacian)]
 CONVERGENT = [name for name in LAPLACIANS if SCHEMES[name].order > 0]
 
@@ -149,13 +153,11 @@ def test_all_borders_of_face_lists_are_as_near_as_the_inside(name, damage, amoun
 def test_all_borders_of_mixed_faces_are_as_near_as_the_inside(name, damage, amount, scheme):
     """Strips are cut short by triangles, so that nearly all rings are of surfaces fitted to one side.
 
-    Some schemes are nearly exact inside minimal surfaces on conformal grids, which that is not: up to 5 times
-    as far off, 11 times beside first cells that are wider than the others.
+    Some schemes are nearly exact inside minimal surfaces on conformal grids, which that is not, and degree
+    five is the highest that it has.
     """
     grid, exact = damaged(name, 32, damage, amount)
-    minimal = name in ("catenoid", "enneper")
-    bound = 3.0 if not minimal else 11.0 if amount > 1 else 5.0
-    as_near_as_inside(grid, exact, scheme, bound, of=on_mixed_faces)
+    as_near_as_inside(grid, exact, scheme, ON_MINIMAL.get((name, amount), 3.0), of=on_mixed_faces)
 
 
 @pytest.mark.slow
@@ -397,8 +399,7 @@ def test_a_slit_ends_in_a_vertex_that_has_a_value():
 def test_borders_of_quads_and_triangles_by_turns(name, scheme, amount):
     """Rings completed by mirror images of triangles and quads were 20 to 1,000 times as far off."""
     grid, exact = damaged(name, 32, *amount)
-    # What is nearly exact inside a minimal surface on conformal grids is no measure of a one-sided fit.
-    as_near_as_inside(grid, exact, scheme, 5.0 if name in ("catenoid", "enneper") else 3.0, of=on_mixed_faces)
+    as_near_as_inside(grid, exact, scheme, ON_MINIMAL.get((name, amount[1]), 3.0), of=on_mixed_faces)
 
 
 def on_mixed_faces(grid, scheme):

@@ -1,9 +1,9 @@
 """Rings at the border closed by points of a surface fitted at the vertex.
 
-Four quads on the surface, parallelograms in the tangent plane, take the place of the fan of faces, with the
-area that it has when completed: along a side as long as the fan's edges are. The fan's own faces with mirror
-images would do where they are alike; but a rough ring, or one of quads and triangles, is no ring on which
-Laplacians are consistent, and the surface knows better.
+Four quads on the surface, parallelograms in the tangent plane, take the place of the fan of faces, with a
+quarter of the area that it has when completed: along a side half as long as the fan's edges are. The fan's
+own faces with mirror images would do where they are alike; but a rough ring, or one of quads and triangles,
+is no ring on which Laplacians are consistent, and the surface knows better.
 """
 
 from __future__ import annotations
@@ -74,7 +74,7 @@ def fans(stencils: Stencils) -> list[Fans]:
 
 
 def stars(stencils: Stencils, fan: Fans, surfaces: Surfaces) -> Stars:
-    """Close fans of as many faces by quads of their size; smaller ones where a fan is not sound."""
+    """Close fans by quads half as long as they are; by others where a fan is not sound."""
     edges = surfaces.flat(stencils.points[fan.edges])
     angle = np.arctan2(edges[..., 1], edges[..., 0])
     corner = np.diff(angle, axis=1) % (2 * np.pi)
@@ -84,7 +84,8 @@ def stars(stencils: Stencils, fan: Fans, surfaces: Surfaces) -> Stars:
     a, b = edges[:, :-1], edges[:, 1:]
     area = np.where(fan.across < 0, 2 * _cross(a, b), _cross(a, across) + _cross(across, b)).sum(axis=1) / 2
     sound &= area > 0
-    area = np.where(sound, area, 1.0) * 2 * np.pi / total / 4  # of one quad; triangles count twice
+    # Of one quad; triangles count twice. Half as long: what a scheme is off by is a quarter.
+    area = np.where(sound, area, 1.0) * 2 * np.pi / total / 16
     first, last = edges[:, 0], edges[:, -1]
     sizes = np.linalg.norm(first, axis=1), np.linalg.norm(last, axis=1)
     with np.errstate(divide="ignore", invalid="ignore"):

@@ -22,6 +22,8 @@ _TURN = 5  # triangles, of which quads are two, around a vertex with points on n
 # Error of points about the mirror images, in edges, or of the mean curvature, in their inverse, from which on
 # there is no surface.
 _DETERMINED = 0.5
+_BIAS = 2.0  # times as much harm as noise what a surface misses of the points does beyond them
+_ENOUGH = 28  # points of a quartic, which has 14 terms
 _FREE = 0.5  # how far a mirror image must be from all points, in distances of points from their nearest
 
 
@@ -149,7 +151,7 @@ def fitted(stencils: Stencils, vertices: Indices, tried: Trials | None = None) -
     shared = nearby.means(indptr, near[near >= 0], noise**2)
     own, noise = noise, np.where(np.isfinite(noise), np.sqrt(shared), np.inf)
     with np.errstate(invalid="ignore"):  # an infinite one times nothing is none
-        error = np.where(np.isfinite(noise), noise * gain, np.inf)
+        error = np.where(np.isfinite(noise), _with_bias(noise, (around >= 0).sum(axis=1)) * gain, np.inf)
     distance = _distance(stencils, around, ring)[:, None]
     known = _wide(stencils, around, ring)[:, None] & (error < _DETERMINED * distance)
     with np.errstate(invalid="ignore"):
@@ -161,6 +163,14 @@ def fitted(stencils: Stencils, vertices: Indices, tried: Trials | None = None) -
     coefficients = found[:, kernel.COEFFICIENTS : kernel.NOISE]
     chosen = maps, coefficients, error[best], noise[best], found[:, kernel.BEND]
     return Surfaces._make((stencils.points[vertices], frames, *chosen, around, ring))
+
+
+def _with_bias(noise: Floats, number: Indices) -> Floats:
+    """Errors of the positions (k, fits): of enough points, what a quartic leaves is all that is by chance."""
+    quartic = _FITS.index((4, 4))
+    few = (np.array(_FITS)[:, 0] < 4) & (number >= _ENOUGH)[:, None]
+    least = np.minimum(noise, noise[:, quartic : quartic + 1])
+    return np.where(few, np.sqrt(least**2 + _BIAS**2 * (noise**2 - least**2)), noise)
 
 
 def wide(stencils: Stencils) -> Bools:
