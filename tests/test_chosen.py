@@ -11,6 +11,8 @@ from test_jet import box, noisy, sampled
 import quadcurv as qc
 from comparisons import accuracy, cases
 from quadcurv import surfaces
+from quadcurv.boundary.lines import extended
+from quadcurv.boundary.septic import sharpened
 from quadcurv.drivers.fits import MeshNeighbourhoods
 from quadcurv.estimate import disagreement
 from quadcurv.refinement import fitted_rate
@@ -350,3 +352,74 @@ def test_noise_at_borders(name, noise, bound):
         rows = [np.moveaxis(square, axis, 0)[[0, -1]] for axis in (0, 1) if not mesh.wrap[axis]]
         squares.append(np.mean(rows))
     assert np.sqrt(np.mean(squares)) < bound
+
+
+OPEN = {
+    "patch": cases.PATCH,
+    "saddle": lambda u, v: (u, v, 0.3 * (u**2 - v**2) + 0.1 * np.sin(2 * u + v)),
+    "wave": lambda u, v: (u + 0.05 * np.sin(2 * v), v, 0.3 * np.sin(2 * u) * np.exp(-(v**2))),
+    "hills": lambda u, v: (u, v + 0.1 * u**2, 0.3 * np.cos(2.2 * u + 1) * np.sin(1.5 * v - 0.4)),
+    "tanh_sheet": surfaces.tanh_sheet(),
+    "enneper": surfaces.enneper(),
+    "catenoid": surfaces.catenoid(),
+}
+
+
+def open_sheet(name):
+    """A grid of 41 x 41 vertices, and its exact mean curvature."""
+    surface = OPEN[name]
+    if not isinstance(surface, surfaces.Surface):
+        surface = surfaces.Surface.from_mapping(surface, ((-1, 1), (-1, 1)), name=name)
+    mesh, xi, eta = surface.sample((41, 41))
+    return mesh, surface.mean_curvature(xi, eta)
+
+
+@pytest.mark.parametrize("name", OPEN)
+def test_the_error_of_plain_fits_is_known_at_borders(name):
+    """Ghosts that both fits read alike would hide what they are off by: the better one has better ghosts."""
+    mesh, H = open_sheet(name)
+    error = np.abs(qc.mean_curvature(mesh, jet(4)) - H)
+    estimate = np.abs(disagreement(mesh, jet(4)))
+    sides = np.ones(error.shape, bool)
+    sides[tuple(slice(None) if wraps else slice(2, -2) for wraps in mesh.wrap)] = False
+    assert spearmanr(error.ravel(), estimate.ravel()).statistic > 0.98
+    assert 0.94 < estimate.mean() / error.mean() < 1.06
+    assert 0.75 < estimate[sides].mean() / error[sides].mean() < 1.1
+
+
+@pytest.mark.parametrize("noise", [0.0, 1e-6, 1e-4, 1e-3])
+@pytest.mark.parametrize("name", OPEN)
+def test_intervals_cover_at_borders(name, noise):
+    """What ghosts are off by shows in no residual, but in what the last of their points changes."""
+    mesh, H = open_sheet(name)
+    edge = np.linalg.norm(np.diff(mesh.points, axis=0), axis=2).mean()
+    shaken = mesh.points + np.random.default_rng(1).normal(0, noise * edge, mesh.points.shape)
+    found = qc.curvatures(qc.QuadGrid(shaken, mesh.wrap))
+    covered = np.abs(found.mean - H) <= found.interval.mean
+    for row in range(3):
+        ends = [
+            covered[tuple(k if x == axis else slice(None) for x in range(2))]
+            for axis, wraps in enumerate(mesh.wrap)
+            if not wraps
+            for k in (row, -1 - row)
+        ]
+        assert np.mean(np.concatenate(ends)) > 0.9
+
+
+@pytest.mark.parametrize("noise", [0.0, 1e-6, 1e-4, 1e-2])
+def test_ghosts_of_degree_seven(noise):
+    """Far better where lines are smooth, and not there where noise would be magnified; noise in edges."""
+    n, h = 20, 0.08
+    u, v = np.meshgrid(h * np.arange(-3, 12), h * np.arange(n), indexing="ij")
+    x = np.stack((u, v, 0.3 * np.sin(2 * u + 0.4) * np.cos(v)), axis=-1)
+    lines = (x + np.random.default_rng(0).normal(0, noise * h, x.shape))[3:11].swapaxes(0, 1)
+    beside = np.stack((np.arange(n - 1), np.arange(1, n)), axis=1)
+    five = extended(lines[:, :6], np.full(n, 0.1), 5, 3, beside)
+    seven, _ = sharpened(five, lines, np.tile((0.0, 0.0, 1.0), (n, 1)), beside)
+    off = [np.abs(found.ghosts - x[2::-1].swapaxes(0, 1)).max() for found in (five, seven)]
+    if noise == 0:
+        assert off[1] < 0.05 * off[0]
+    elif noise == 1e-6:
+        assert off[1] < 2 * off[0]
+    else:
+        np.testing.assert_array_equal(seven.ghosts, five.ghosts)

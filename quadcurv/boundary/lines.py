@@ -202,8 +202,9 @@ def _error(terms: Floats, ghosts: Floats, ends: _Ends, degree: int) -> tuple[Flo
     smooth = without_excess(np.where(outside, excess, np.inf), beside)
     smooth &= number > (LEAST if degree < 5 else LEAST + 1)
     # Along the surface an error does harm by as much as the surface turns from point to point.
-    square = _around(along + turn**2 * all_, beside)
-    calm = (number > LEAST) & (_around(along, beside) < _CALM * _around(_dot(before, normal) ** 2, beside))
+    square = mean_around(along + turn**2 * all_, beside)
+    lately, sooner = (mean_around(y, beside) for y in (along, _dot(before, normal) ** 2))
+    calm = (number > LEAST) & (lately < _CALM * sooner)
     square = np.where(calm & (degree < 5), _FAITHFUL, 1.0) * square
     if degree > 4:
         doubt = (
@@ -219,9 +220,14 @@ def _error(terms: Floats, ghosts: Floats, ends: _Ends, degree: int) -> tuple[Flo
 def _noise2(last: Floats, number: Indices, beside: Indices) -> Floats:
     """Square of the noise of lines, by how far their last differences are from those of the lines beside."""
     gain = np.array([comb(2 * m - 2, m - 1) for m in range(1, NODES + 1)])[number - 1]
+    return mean_beside(last / np.sqrt(gain), beside)
+
+
+def mean_beside(last: Floats, beside: Indices) -> Floats:
+    """Mean square of what is independent from line to line, by how far each is from those beside it."""
     others = _sum_beside(np.ones_like(last), beside) - 1
     off = last - (_sum_beside(last, beside) - last) / np.maximum(others, 1)
-    return _around(np.where(others > 0, off**2 / (gain * (1 + 1 / np.maximum(others, 1))), 0.0), beside)
+    return mean_around(np.where(others > 0, off**2 / (1 + 1 / np.maximum(others, 1)), 0.0), beside)
 
 
 def _dot(a: Floats, b: Floats) -> Floats:
@@ -239,10 +245,10 @@ def _sideways(ends: Floats, beside: Indices) -> Floats:
 
 def without_excess(excess: Floats, beside: Indices) -> Bools:
     """Where the last point changes no more than it may, of a line and those around it together."""
-    return _around(excess, beside) <= 0
+    return mean_around(excess, beside) <= 0
 
 
-def _around(values: Floats, beside: Indices) -> Floats:
+def mean_around(values: Floats, beside: Indices) -> Floats:
     """Mean of the values of a line and, with less weight, of two lines on either side."""
     weights = np.ones_like(values)
     for _ in range(2):

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from quadcurv.boundary.lines import LEAST, NODES, continued, doubtful_corners, extended
+from quadcurv.boundary.septic import LONG, sharpened
 from quadcurv.stencils import Stencils, face_pairs
 from quadcurv.types import Bools, Floats, Indices
 
@@ -32,12 +33,15 @@ class Ghosts(NamedTuple):
         The estimated error of the ghosts around a border vertex; infinite where they do not close its ring.
     smooth : (n,) bool
         Whether they close it and are right beyond doubt.
+    change : (n,) float64
+        What the last point of the lines changes along the normal; NaN where lines are too short to tell.
     """
 
     points: Floats
     quads: NDArray[np.int32]
     error: Floats
     smooth: Bools
+    change: Floats
 
 
 class _Lines(NamedTuple):
@@ -68,8 +72,8 @@ class _Lines(NamedTuple):
         return self.line.reshape(-1, 2)
 
 
-def _lines(mesh: Stencils, least: int) -> _Lines:
-    rails, slot, valence, n_edges = _strips(mesh, least)
+def _lines(mesh: Stencils, least: int, nodes: int = NODES) -> _Lines:
+    rails, slot, valence, n_edges = _strips(mesh, least, nodes)
     long_first = np.argsort((rails < 0).sum(axis=1), kind="stable")
     key = rails[long_first, 0] * mesh.n + rails[long_first, 1]
     _, first, line = np.unique(key, return_index=True, return_inverse=True)
@@ -79,14 +83,22 @@ def _lines(mesh: Stencils, least: int) -> _Lines:
 
 @np.errstate(all="ignore")
 def ghosts(mesh: Stencils, degree: int = 4, layers: int = 1) -> Ghosts:
-    """Continue the strips inward from border edges by `layers` ghosts on polynomials of a degree."""
-    n, found = mesh.n, _lines(mesh, LEAST)
+    """Continue the strips inward from border edges by `layers` ghosts on polynomials of a degree.
+
+    Of degree seven where the lines are smooth enough, else of degree five at most.
+    """
+    n, found = mesh.n, _lines(mesh, LEAST, NODES if degree < NODES else LONG)
     rails, line, lines, slot, valence, n_edges = found
     if len(rails) == 0:
-        return Ghosts(np.empty((0, 3)), np.empty((0, 4), np.int32), np.full(n, np.inf), np.zeros(n, bool))
+        none = np.empty((0, 3)), np.empty((0, 4), np.int32)
+        return Ghosts(*none, np.full(n, np.inf), np.zeros(n, bool), np.full(n, np.nan))
     x = np.where(lines[..., None] >= 0, mesh.points[lines], np.nan)
-    turn = _normals(mesh)[1]
-    beside = extended(x, turn[lines[:, 0]], degree, layers, found.beside)
+    normals, turn = _normals(mesh)
+    degree = min(degree, NODES - 1)
+    beside = extended(x[:, :NODES], turn[lines[:, 0]], degree, layers, found.beside)
+    change = np.full(len(lines), np.nan)
+    if x.shape[1] > NODES:
+        beside, change = sharpened(beside, x, normals[lines[:, 0]], found.beside)
     outward = np.concatenate((rails[:, :1], n + layers * line[:, None] + np.arange(layers)), axis=1)
     quads = _block_quads(outward.reshape(-1, 2, layers + 1).transpose(0, 2, 1)[..., ::-1], slot)
 
@@ -124,7 +136,10 @@ def ghosts(mesh: Stencils, degree: int = 4, layers: int = 1) -> Ghosts:
     closed[c] = True
     ghosts = np.concatenate((beside.ghosts.reshape(-1, 3), points.reshape(-1, 3)))
     error[~closed] = np.inf
-    return Ghosts(ghosts, np.concatenate((quads, corner_quads)), error, smooth & closed)
+    most = np.zeros(n)
+    np.maximum.at(most, rails[:, 0], change[line])  # NaN stays
+    most[~closed] = np.nan
+    return Ghosts(ghosts, np.concatenate((quads, corner_quads)), error, smooth & closed, most)
 
 
 def roughness(mesh: Stencils) -> Floats:
@@ -182,12 +197,12 @@ def _beside(rails: Indices, line: Indices, along: Indices, n: int) -> tuple[Indi
     return line[place], (key[place] == wanted).all(axis=1)
 
 
-def _strips(mesh: Stencils, least: int) -> tuple[Indices, Indices, Indices, Indices]:
+def _strips(mesh: Stencils, least: int, nodes: int) -> tuple[Indices, Indices, Indices, Indices]:
     """Strips of quads inward from border edges, straight through regular vertices.
 
     Returns
     -------
-    rails : (2 k, NODES) int64
+    rails : (2 k, nodes) int64
         The two sides of each strip; its first face runs from the first one to the second. -1 for the last
         points, if there are at least `least`.
     slot : (k,) int64
@@ -217,10 +232,10 @@ def _strips(mesh: Stencils, least: int) -> tuple[Indices, Indices, Indices, Indi
     kept &= faces[f, 3] >= 0
     f, i, j = f[kept], i[kept], j[kept]
     slot = i
-    strips = np.full((f.size, 2, NODES), -1)
+    strips = np.full((f.size, 2, nodes), -1)
     strips[:, 0, 0], strips[:, 1, 0] = faces[f, i], faces[f, j]
     place = np.arange(f.size)
-    for k in range(1, NODES):
+    for k in range(1, nodes):
         i, j = (2 * i - j) % 4, (2 * j - i) % 4  # across the quad, where the edge begins and ends
         u, v = faces[f, i], faces[f, j]
         strips[place, 0, k], strips[place, 1, k] = u, v
@@ -231,4 +246,4 @@ def _strips(mesh: Stencils, least: int) -> tuple[Indices, Indices, Indices, Indi
         f = around[kept, beyond[kept].argmax(axis=1)]
         i, j = (faces[f] == u[:, None]).argmax(axis=1), (faces[f] == v[:, None]).argmax(axis=1)
     long_enough = strips[:, 0, least - 1] >= 0
-    return strips[long_enough].reshape(-1, NODES), slot[long_enough], valence, n_edges
+    return strips[long_enough].reshape(-1, nodes), slot[long_enough], valence, n_edges

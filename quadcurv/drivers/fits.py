@@ -1,8 +1,9 @@
 """Any fit on any mesh: what it sees of the mesh, NaN where nothing is known, the sign, the shape.
 
 Borders: with boundary="extrapolate" grids and face lists go on by up to three layers of ghosts, by quintic
-extrapolation along strips of six points, wherever the strips are complete and smooth (see `boundary`).
-Elsewhere a neighbourhood ends at the border and a fit is one-sided.
+extrapolation along strips of six points, three layers by that of degree seven along smooth strips of eight,
+wherever the strips are complete and smooth (see `boundary`). Elsewhere a neighbourhood ends at the border and
+a fit is one-sided.
 """
 
 from __future__ import annotations
@@ -15,7 +16,6 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from quadcurv.boundary import (
-    REACH,
     Surfaces,
     Trials,
     checked_boundary,
@@ -37,7 +37,8 @@ from quadcurv.types import Bools, Floats, Indices, Ints
 if TYPE_CHECKING:
     from quadcurv.kernels.lines import Lines
 
-_GHOST_DEGREE, _GHOST_LAYERS = 5, 3
+_GHOST_LAYERS = 3
+_GHOST_DEGREE = {1: 5, 2: 5, 3: 7}  # by layers: one more than that of the fits at least
 ROUNDING = 2.0**-49  # of positions, and of what is computed from them
 _SURE = 0.01
 _CLEARLY = 3.0  # what the standard error of a one-sided fit must be of another's to be thought larger
@@ -98,7 +99,10 @@ class MeshNeighbourhoods:
             narrow = kind == jet.ROUND and self._windows is not None and self._windows.overlap(rings)
             own = self._faces if self._windows is None or narrow else self._windows
         out = own.polynomials(vertices, degree, rings, kind, nested)
-        for faces, place, reach, error in (*(self._beyond(rings) if ghosts else ()), *self._at_poles(rings)):
+        for faces, place, reach, error, _ in (
+            *(self._beyond(rings) if ghosts else ()),
+            *self._at_poles(rings),
+        ):
             at = np.where(self._at_crease[vertices], -1, place[vertices]) if one_sided else place[vertices]
             if error is not None:  # one-sided fits follow a smooth surface as well, but magnify noise
                 if kind in (jet.SMOOTH, jet.FLAT):
@@ -113,6 +117,16 @@ class MeshNeighbourhoods:
     def border_error(self, rings: int) -> Floats:
         """(n,): see `Neighbourhoods`."""
         return self.at_border(rings)[0]
+
+    @cached_property
+    def ghost_error(self) -> Floats:
+        """(n,): see `Neighbourhoods`."""
+        out = np.zeros(self.stencils.n)
+        for _, place, _, _, change in self._beyond(_GHOST_LAYERS):
+            if change is not None:
+                at = np.flatnonzero(self.on_border & (place >= 0))
+                out[at] = change[place[at]]
+        return out
 
     def at_border(self, rings: int) -> Floats:
         """(2, n): standard error of H and noise by surfaces fitted at the border.
@@ -129,7 +143,7 @@ class MeshNeighbourhoods:
             own = self._sides if bool((self.on_crease | self.on_jump).any()) else self._faces
             return own.positions(vertices, rings), own.normals[vertices]
         out, normals = self._faces.positions(vertices, rings), self._faces.normals[vertices]
-        for faces, place, reach, error in (*self._beyond(rings), *self._at_poles(rings)):
+        for faces, place, reach, error, _ in (*self._beyond(rings), *self._at_poles(rings)):
             at = place[vertices]
             kept = (at >= 0) & (error is None)
             out = _replaced(out, kept, faces.positions(at[kept], reach))
@@ -292,12 +306,14 @@ class _Beyond(NamedTuple):
     """Neighbourhoods of `reach` rings that go on beyond the border, and the places of vertices in them.
 
     Where there is an `error`, of H by these, they are taken if that of the one-sided fit is clearly larger.
+    `change` is that of ghosts, see `boundary.strips.Ghosts`, at their places.
     """
 
     faces: FaceRings
     place: Indices
     reach: int
     error: Floats | None = None
+    change: Floats | None = None
 
 
 def _continued(stencils: Stencils, layers: int, fitted: Callable[[Indices], Surfaces]) -> list[_Beyond]:
@@ -307,10 +323,10 @@ def _continued(stencils: Stencils, layers: int, fitted: Callable[[Indices], Surf
     """
     from quadcurv.kernels import topology
 
-    border = np.flatnonzero(~stencils.closed)
-    kept, faces = topology.part_around(stencils.faces, border, stencils.n, REACH)
+    border, degree = np.flatnonzero(~stencils.closed), _GHOST_DEGREE[layers]
+    kept, faces = topology.part_around(stencils.faces, border, stencils.n, degree)
     part = stencils.part(kept, faces)
-    layer = ghosts(part, _GHOST_DEGREE, layers)
+    layer = ghosts(part, degree, layers)
     if layer.quads.size == 0:
         return []
     points = np.concatenate((part.points, layer.points))
@@ -332,7 +348,7 @@ def _continued(stencils: Stencils, layers: int, fitted: Callable[[Indices], Surf
     chosen = np.flatnonzero((near & ~bad)[: part.n])
     place = np.full(stencils.n, -1)
     place[kept[chosen]] = chosen
-    return [_Beyond(FaceRings(ghosted), place, layers)]
+    return [_Beyond(FaceRings(ghosted), place, layers, change=layer.change)]
 
 
 def _seen_across(mesh: Mesh, stencils: Stencils) -> Bools:

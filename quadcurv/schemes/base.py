@@ -204,6 +204,9 @@ class Neighbourhoods(Protocol):
         Of the positions, in length.
     on_border : (n,) bool
         Vertices whose ring of faces is open.
+    ghost_error : (n,) float64
+        What ghosts beyond smooth borders may be off by at border vertices, in length, by what the last of
+        their points changes; 0 inside, NaN where nothing tells.
     on_crease, on_jump : (n,) bool
         Vertices on creases, and on lines at which the curvature jumps; round neighbourhoods end at both.
     points : (n, 3) float64
@@ -221,6 +224,8 @@ class Neighbourhoods(Protocol):
     def rounding(self) -> float: ...  # noqa: D102
     @property
     def on_border(self) -> Bools: ...  # noqa: D102
+    @property
+    def ghost_error(self) -> Floats: ...  # noqa: D102
     @property
     def on_crease(self) -> Bools: ...  # noqa: D102
     @property

@@ -154,10 +154,14 @@ class _Found:
         inside = around.on_border.astype(np.float64)[:, None]
         for _ in range(_INSIDE):
             inside = around.pooled(inside)
+        gain = self.values[:, kernel.GAIN : kernel.GAIN + 4]
+        # What ghosts are off by shows in no residual.
+        at = np.flatnonzero(self.is_smooth & (self.rings <= 3) & (around.ghost_error > 0))
+        out[at] = np.hypot(out[at], gain[at] * around.ghost_error[at, None])
         at = np.flatnonzero(self.is_smooth & (inside[:, 0] == 0))
         if at.size == 0:
             return out
-        gain = self.values[at, kernel.GAIN : kernel.GAIN + 4]
+        gain = gain[at]
         off = np.full((len(out), 1), np.nan)
         off[at, 0] = (self.values[at, kernel.BIAS] / gain[:, 0]) ** 2
         for _ in range(_NEAR):

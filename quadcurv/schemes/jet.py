@@ -55,8 +55,9 @@ def jet(degree: int | None = None, rings: int | None = None) -> Fit:
         all this; both are 0 where there is no result.
         With boundary="extrapolate" as many ghost layers as rings, if these are no more than three,
         are put around grids and face lists, by quintic extrapolation along strips of six points as
-        :func:`quadcurv.one_rings` traces them: borders are then as good as the inside. Fits are one-sided
-        where a strip is rough or cannot be traced.
+        :func:`quadcurv.one_rings` traces them; three layers are of degree seven, through eight points, where
+        these are smooth. Borders are then as good as the inside. Fits are one-sided where a strip is rough
+        or cannot be traced.
 
     Raises
     ------
