@@ -423,3 +423,18 @@ def test_ghosts_of_degree_seven(noise):
         assert off[1] < 2 * off[0]
     else:
         np.testing.assert_array_equal(seven.ghosts, five.ghosts)
+
+
+def test_directions_under_noise_are_those_of_all_fits():
+    """Two thirds as far off as those of the fit whose H is taken, and still a frame with its normal."""
+    star = cases.on(cases.STAR, cases.catmull_clark(cases.dodecahedron(), 4))
+    true = cases.STAR.direction1(np.asarray(star.mesh.points))
+    apart = star.k1 - star.k2 > 0.1 * np.maximum(np.abs(star.k1), np.abs(star.k2))
+    found = qc.curvatures(star.noisy(0.05).mesh)
+    angles = np.rad2deg(np.arccos(np.minimum(np.abs(np.einsum("kx,kx->k", found.direction1, true)), 1)))
+    assert angles[apart].mean() < 3.6  # 4.3 by the fit itself
+    frame = np.stack((found.direction1, found.direction2, found.normal), axis=1)
+    np.testing.assert_allclose(
+        frame @ frame.swapaxes(1, 2), np.tile(np.eye(3), (len(frame), 1, 1)), atol=1e-12
+    )
+    np.testing.assert_allclose(np.linalg.det(frame), 1, atol=1e-12)

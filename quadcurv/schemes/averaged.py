@@ -13,6 +13,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from quadcurv.boundary import tangent_frames
 from quadcurv.schemes.base import Neighbourhoods
 from quadcurv.types import Bools, Floats, Indices
 
@@ -45,6 +46,44 @@ _DOUBT = 2.0
 _ALIKE = 5.0  # vertices whose residuals are one another's
 
 
+# Times its square that of H's bias counts for directions: terms that are not looked at make the principal
+# curvatures less different and turn them little.
+_TURNED = 0.1
+
+
+class Directions:
+    """Directions of k1 from all fits that were made, each the more sure the less noise and bias turn it.
+
+    Fits of different degree and rings err in different ways: together they are off by a fifth less than the
+    best of them. What is averaged is the difference of the principal curvatures as it is turned, in a plane.
+    """
+
+    def begin(self, normals: Floats) -> None:
+        """Take the planes of these normals (k, 3)."""
+        self.first, self.second = tangent_frames(normals).swapaxes(0, 1)[:2]
+        self.sums, self.unit = np.zeros(len(normals), complex), np.full(len(normals), np.nan)
+
+    def add(self, at: Indices | slice, candidate: Candidate, noise2: Floats) -> None:
+        """Add a fit at some of the vertices."""
+        from quadcurv.kernels import jet as kernel
+
+        fits, gain2 = candidate.fits, candidate.gain2
+        parts2 = (fits[:, kernel.GAIN + 2] ** 2 + fits[:, kernel.GAIN + 3] ** 2) / 2
+        off2 = np.maximum(parts2 - gain2, 0.0) * noise2 + _TURNED * candidate.bias2
+        known = candidate.good & (off2 > 0)
+        self.unit[at] = np.where(np.isnan(self.unit[at]) & known, off2, self.unit[at])
+        weight = np.divide(self.unit[at], off2, out=np.zeros(off2.size), where=known) ** 2
+        weight *= fits[:, kernel.K1] - fits[:, kernel.K2]
+        x, y = (np.einsum("kx,kx->k", fits[:, kernel.DIRECTION1], e[at]) for e in (self.first, self.second))
+        self.sums[at] += np.nan_to_num(weight) * np.nan_to_num(x + 1j * y) ** 2
+
+    def of_k1(self) -> Floats:
+        """(k, 3): in the planes of the given normals; NaN where nothing is known."""
+        with np.errstate(invalid="ignore"):
+            half = np.sqrt(self.sums / np.abs(self.sums))
+        return half.real[:, None] * self.first + half.imag[:, None] * self.second
+
+
 class Candidate:
     """A fit that vertices could have: results, squares of its bias as it seems and in intervals, its risk."""
 
@@ -59,11 +98,12 @@ class Candidate:
 
 
 def least_risks(
-    around: Neighbourhoods, vertices: Indices
+    around: Neighbourhoods, vertices: Indices, directions: Directions
 ) -> Iterator[tuple[Indices, Floats, Indices, int, int, Floats, Floats]]:
     """Fits that are better than those before: vertices, results, their rows, degree, rings, noise, biases.
 
-    Noise is the variance of the positions along the normal, biases (k, 4) are those of H, K, k1 and k2.
+    To `directions` all fits are added. Noise is the variance of the positions along the normal, biases (k, 4)
+    are those of H, K, k1 and k2.
     """
     from quadcurv.kernels import jet as kernel
 
@@ -81,8 +121,11 @@ def least_risks(
             of = np.where(of[:, 1:] > 0, of, np.nan)  # a fit that magnifies noise tells of it
             square, freedom = spread(around, vertices, of, _NOISE).T
             noise2 = square / freedom
+            directions.begin(fits[2][:, kernel.NORMAL])
         noise2_here = noise2[some]
         candidates = list(_candidates(around, here, r, noise2_here, fits))
+        for c in candidates:
+            directions.add(some, c, noise2_here)
         risks = np.stack([c.risk for c in candidates])
         best, risk = np.argmin(risks, axis=0), np.min(risks, axis=0)
         most2 = _of_best(best, [c.most2 for c in candidates])

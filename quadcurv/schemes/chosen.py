@@ -118,6 +118,17 @@ class _Found:
         self.sigma[at], self.freedom[at] = noise, np.maximum(fits[rows, self.kernel.FREEDOM], 1.0)
         self.bias[at] = bias
 
+    def turn(self, at: Indices, directions: Floats) -> None:
+        """Take directions of k1 from other fits, in the tangent planes of these."""
+        kernel = self.kernel
+        normal = self.values[at, kernel.NORMAL]
+        first = directions - np.einsum("kx,kx->k", directions, normal)[:, None] * normal
+        size = np.linalg.norm(first, axis=1, keepdims=True)
+        known = (size > 0.5)[:, 0]
+        first = first[known] / size[known]
+        self.values[at[known], kernel.DIRECTION1] = first
+        self.values[at[known], kernel.DIRECTION2] = np.cross(normal[known], first)
+
     def take(self, other: _Found, at: Indices) -> None:
         """Results of another, which is nobody's then."""
         for name in ("values", "degree", "rings", "is_smooth", "sigma", "freedom", "bias"):
@@ -437,8 +448,10 @@ def _average(around: Neighbourhoods, noisy: Bools, hardly: Bools, found: _Found)
     vertices, other = np.flatnonzero(noisy | hardly), _Found(around)
     if vertices.size == 0:
         return noisy
-    for at, fits, rows, d, r, noise2, bias in averaged.least_risks(around, vertices):
+    directions = averaged.Directions()
+    for at, fits, rows, d, r, noise2, bias in averaged.least_risks(around, vertices, directions):
         other.put_noisy(at, fits, d, r, np.sqrt(noise2), bias, rows)
+    other.turn(vertices, directions.of_k1())
     todo = np.flatnonzero(noisy & (other.degree == 0))
     for d, r in _MORE:
         if todo.size == 0:
