@@ -160,7 +160,8 @@ def differences(around: Neighbourhoods, vertices: Indices, error: Floats) -> Dif
     edge2 = dot(slope, slope)
     first = np.argmax(edge2, axis=0)
     found = vertices[noise[vertices] * _LEAST_GAIN < error * edge2.min(axis=0)[vertices]]
-    fits, change = np.full((found.size, kernel.COLUMNS), np.nan), np.full((n, 6), np.nan)
+    # Column by column, as all results of fits lie.
+    fits, change = np.full((kernel.COLUMNS, found.size), np.nan).T, np.full((n, 6), np.nan)
     fits[:, kernel.FREEDOM] = _FREEDOM
     middle = np.zeros(n, bool)
     for start in range(0, found.size, _AT_ONCE):
@@ -179,7 +180,9 @@ def differences(around: Neighbourhoods, vertices: Indices, error: Floats) -> Dif
     with np.errstate(divide="ignore", invalid="ignore"):
         bias = np.fmin(_NEXT * behind / before, 1.0) * np.fmax(each, _SHARE * whole)
     known = np.isfinite(fits[:, : kernel.NORMAL.stop]).all(axis=1)
-    return Differences(found[known], fits[known], noise[found[known]], bias.T[known])
+    if known.all():
+        return Differences(found, fits, noise[found], bias.T)
+    return Differences(found[known], fits.T[:, known].T, noise[found[known]], bias.T[known])
 
 
 def _block(
