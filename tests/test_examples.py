@@ -12,7 +12,7 @@ from quadcurv.viewing import opengl_problem
 
 EXAMPLES = Path(__file__).parents[1] / "examples"
 RETURNS = {
-    "blocks_that_meet": pytest.approx(8.423e-5, rel=1e-3),
+    "blocks_that_meet": pytest.approx(2.217e-5, rel=1e-3),
     "cad_fillet": pytest.approx(1.00215, abs=1e-4),
     "cubed_sphere": pytest.approx(6.796, rel=1e-3),
     "damaged_mesh": 4.0,
