@@ -60,13 +60,15 @@ def _at_one_place(
     edge = np.abs(points[b] - points[a]).max(axis=1)
     step = np.linalg.norm(points[beside_a] - points[a], axis=1)
     rounding = 16 * roundoff * np.abs(points[a]).max(axis=1)
-    found = np.full(len(points), -1)
+    vertices, ends = np.unique(np.concatenate((a, b)), return_inverse=True)
+    begins, ends = ends.reshape(2, -1)
+    found = np.full(vertices.size, -1)
     for nearer in _STEPS:
         one = (edge <= nearer * _POINT * step + rounding) & (rounding < 1e-3 * step)
-        one &= (found[a] < 0) & (found[b] < 0)
+        one &= (found[begins] < 0) & (found[ends] < 0)
         if not one.any():
             break
-        u, v = a[one], b[one]
+        u, v = begins[one], ends[one]
         graph = scipy.sparse.coo_array((np.ones(u.size, bool), (u, v)), (found.size, found.size))
         _, of = scipy.sparse.csgraph.connected_components(graph, directed=False)
         _, first, number = np.unique(of, return_index=True, return_counts=True)
@@ -75,16 +77,21 @@ def _at_one_place(
         inward = np.full(number.size, np.inf)
         begin = np.full(number.size, -1)
         begin[of[u[::-1]]] = beside_a[one][::-1]
-        for ends, other in ((u, beside_a[one]), (v, beside_b[one])):
-            np.maximum.at(size, of[u], np.linalg.norm(points[ends] - points[first[of[u]]], axis=1))
+        for end, other in ((a[one], beside_a[one]), (b[one], beside_b[one])):
+            at_first = points[vertices[first[of[u]]]]
+            np.maximum.at(size, of[u], np.linalg.norm(points[end] - at_first, axis=1))
             np.maximum.at(fan, of[u], np.linalg.norm(points[other] - points[begin[of[u]]], axis=1))
-            np.minimum.at(inward, of[u], np.linalg.norm(points[other] - points[ends], axis=1))
+            np.minimum.at(inward, of[u], np.linalg.norm(points[other] - points[end], axis=1))
         np.maximum.at(rounded, of[u], rounding[one])
         near = (
             (number >= _LEAST) & (size <= _POINT * inward + 2 * rounded) & (size <= _FAN * fan + 2 * rounded)
         )
-        found[near[of]] = first[of[near[of]]]
-    return found if found.max(initial=-1) >= 0 else None
+        found[near[of]] = vertices[first[of[near[of]]]]
+    if found.max(initial=-1) < 0:
+        return None
+    pole = np.full(len(points), -1)
+    pole[vertices] = found
+    return pole
 
 
 @np.errstate(all="ignore")
