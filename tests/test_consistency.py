@@ -241,6 +241,17 @@ def test_angle_defects_at_folds_are_told(shape):
     assert np.nanmax(np.abs(K)) > 3 * np.abs(plain).max()
 
 
+def test_rows_that_cross_in_large_grids_are_seen():
+    """Of more than 16,384 vertices not all are looked at first."""
+    t = np.linspace(-1, 1, 301)
+    u, v = np.meshgrid(t, t, indexing="ij")
+    points, _ = sheet(u + np.where(np.arange(301)[:, None] == 150, 0.2 * v, 0.0), v)
+    with pytest.warns(qc.ConsistencyWarning, match="finite_volume"):
+        qc.mean_curvature(qc.QuadGrid(points), "finite_volume")
+    with pytest.warns(qc.ConsistencyWarning, match="finite_volume"):
+        qc.mean_curvature_normal(qc.QuadGrid(points), "finite_volume")
+
+
 def test_folds_are_none_of_sharp_edges():
     """A roof as steep as that: each face is turned less than a quarter from the mean."""
     x, y = np.meshgrid(np.arange(5.0), np.arange(5.0), indexing="ij")
