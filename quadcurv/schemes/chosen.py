@@ -51,7 +51,8 @@ _NEAR, _INSIDE = 4, 3  # rings over which that is looked at, and rings to the bo
 _SMALLER = ((4, 2), (2, 1))
 _AT_ONCE = 2**13  # vertices that quadrics are fitted at
 _EXACT = 1e-3  # of the residuals of quadratic fits: all lie on one quadric
-_DOUBT = 0.02  # of the curvature, from which errors on others are asked
+# Errors, of the curvature, from which on others are asked, and below which nobody is.
+_DOUBT, _ENOUGH = 0.02, 1e-6
 _NEARLY_ALL, _MOST = 0.8, 0.5
 # Of an error, as much as another way must claim to be taken, and to be believed against it.
 _CLEARLY_LESS, _SURER = 0.3, 0.1
@@ -215,14 +216,13 @@ def chosen(around: Neighbourhoods) -> Curvatures:
         known = here[:, kernel.CONDITION] <= _CONDITION[2]
         found.put_noisy(creased[known], here[known], 2, 1, here[known, kernel.SIGMA], 0.0)
     vertices = np.flatnonzero(around.wanted & ~feature)
-    if vertices.size:
-        _smooth_or_noisy(around, vertices, found)
-    _along_lines(around, np.flatnonzero(around.wanted), found)
+    noisy = _smooth_or_noisy(around, vertices, found) if vertices.size else feature
+    _along_lines(around, noisy, found)
     return found.curvatures(around.on_crease)
 
 
-def _smooth_or_noisy(around: Neighbourhoods, vertices: Indices, found: _Found) -> None:
-    """Take fits of heights, by what the three rings of vertices tell."""
+def _smooth_or_noisy(around: Neighbourhoods, vertices: Indices, found: _Found) -> Bools:
+    """Take fits of heights, by what the three rings of vertices tell; where noise prevails."""
     from quadcurv.kernels import jet as kernel
 
     fits = _smooth(around, vertices, 6, 3)
@@ -244,6 +244,7 @@ def _smooth_or_noisy(around: Neighbourhoods, vertices: Indices, found: _Found) -
     vertices = vertices[~noisy[vertices]]
     least = np.where(sure[vertices], _DOUBT, 0.0)
     _quadrics(around, vertices[~(found.doubt(vertices, around.rounding) <= least)], found)
+    return noisy
 
 
 def _smooth(around: Neighbourhoods, vertices: Indices, d: int, r: int, ghosts: bool = True) -> Floats:
@@ -303,14 +304,29 @@ def _quadrics(around: Neighbourhoods, vertices: Indices, found: _Found) -> None:
         found.put_noisy(at, fits, 2, 3, fits[:, kernel.SIGMA], apart)
 
 
-def _along_lines(around: Neighbourhoods, vertices: Indices, found: _Found) -> None:
-    """Take differences along the lines of the mesh where these claim less error, and do not contradict."""
-    own, other = found.errors(vertices)[:, 0], _Found(around)
-    at, fits, noise, bias = lattice.differences(around, vertices, own)
+def _along_lines(around: Neighbourhoods, noisy: Bools, found: _Found) -> None:
+    """Take differences along the lines of the mesh where these claim less error, and do not contradict.
+
+    Not amid noise, nor where the others are good enough.
+    """
+    kernel, before = found.kernel, found.errors()
+    values, error = found.values, before[:, 0]
+    with np.errstate(invalid="ignore"):
+        size = np.maximum(np.abs(values[:, kernel.K1]), np.abs(values[:, kernel.K2]))
+        asked = around.wanted & (error > np.maximum(_ENOUGH * size, around.rounding * values[:, kernel.GAIN]))
+    if noisy.any():
+        share = noisy.astype(np.float64)[:, None]
+        for _ in range(_NEAR):
+            share = around.pooled(share)
+        asked &= ~(noisy & (share[:, 0] > _NEARLY_ALL))
+    vertices, other = np.flatnonzero(asked), _Found(around)
+    if vertices.size == 0:
+        return
+    at, fits, noise, bias = lattice.differences(around, vertices, error[vertices])
     other.put_noisy(at, fits, lattice.DEGREE, lattice.RINGS, noise, bias)
-    before, now = found.errors(at), other.errors(at)
+    before, now = before[at], other.errors(at)
     # Where both are sure of something else, what is between them counts.
-    apart = np.abs(found.values[at, :4] - fits[:, :4])
+    apart = np.abs(values[at, :4] - fits[:, :4])
     other.bias[at] = np.where((apart > before + now) & (now > _SURER * before), apart / 2, bias)
     found.take(other, at[now[:, 0] < _CLEARLY_LESS * before[:, 0]])
 

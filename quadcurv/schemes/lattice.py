@@ -110,6 +110,20 @@ def _on_long_lines(lines: Lines) -> Bools:
     return long[line[lines.place]].all(axis=0)
 
 
+def _near(around: Neighbourhoods, vertices: Indices) -> Bools:
+    """(n,): whose lines vertices on long lines ask for, at least."""
+    if 2 * vertices.size > len(around.points):
+        return np.ones(len(around.points), bool)
+    near = np.zeros(len(around.points))
+    near[vertices] = 1.0
+    for _ in range(_PASSES + _AROUND):
+        near = around.pooled(near[:, None])[:, 0]
+    asked = near > 0
+    for axis in range(2):
+        asked[_windows(around.lines, axis, vertices).points] = True
+    return asked
+
+
 def _blocks(vertices: Indices) -> Iterator[Indices]:
     for start in range(0, vertices.size, _AT_ONCE):
         yield vertices[start : start + _AT_ONCE]
@@ -142,7 +156,9 @@ def differences(around: Neighbourhoods, vertices: Indices, error: Floats) -> Dif
 
     lines, n = around.lines, len(around.points)
     points, slope, rough = around.points.T.copy(), np.full((3, 2, n), np.nan), np.full((3, n), np.nan)
-    for at in _blocks(np.flatnonzero(_on_long_lines(lines))):
+    on_lines = _on_long_lines(lines)
+    vertices, error = vertices[on_lines[vertices]], error[on_lines[vertices]]
+    for at in _blocks(np.flatnonzero(on_lines & _near(around, vertices))):
         here = points[:, at][:, None]
         rough[:, at] = 0.0
         for axis in range(2):
