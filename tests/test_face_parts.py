@@ -7,10 +7,11 @@ import warnings
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 import quadcurv as qc
+from quadcurv.boundary import poles_of_faces
 from quadcurv.kernels import parts as kernels
 from quadcurv.mesh import part_files
 from quadcurv.surfaces import cubed_ellipsoid, torus
@@ -372,6 +373,7 @@ def with_warnings(call, *given, **options):
 
 @settings(max_examples=25, deadline=None)
 @given(st.integers(0, 2**32 - 1), st.integers(1, 9), st.booleans())
+@example(1527, 5, False)
 def test_damaged_faces_are_mended_and_turned_as_those_of_one_mesh(seed, number, scattered):
     """Faces turned, given twice, with a repeated vertex, missing; edges of three faces."""
     random = np.random.default_rng(seed)
@@ -390,8 +392,10 @@ def test_damaged_faces_are_mended_and_turned_as_those_of_one_mesh(seed, number, 
         points, faces = shuffled(points, faces)
     with tempfile.TemporaryDirectory() as folder:
         one, parts, found, _, _ = both_ways(points, faces, folder, number)
+        # Rings beside poles are read off fitted surfaces, whose sums parts may take in another order.
+        few_digits = 0.0 if poles_of_faces(one.stencils()) is None else 1e-13
         for name, values in with_any_warnings(qc.evaluate, one, *WANTED).items():
-            np.testing.assert_array_equal(found[name], values, err_msg=name)
+            np.testing.assert_allclose(found[name], values, few_digits, few_digits, err_msg=name)
         if parts.sides is not None:
             assert (parts.sides.orientable, parts.sides.turned) == (one.orientable, one.report["turned"])
 

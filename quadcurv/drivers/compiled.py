@@ -45,11 +45,20 @@ def evaluate_faces(
     """
     assert scheme.fast is not None
     others, part = mesh.irregular_part()
-    if others.size and poles_of_faces(part) is not None:  # rare: all of it the slow way
-        return direct.evaluate(mesh.stencils(), one_rings(mesh, boundary), scheme, results)
     _evaluate_rings(mesh, scheme.fast, results)
     far = direct.NOWHERE
-    if others.size:
+    if others.size and poles_of_faces(part) is not None:  # rare: all of it the slow way, too
+        given, treated = mesh.stencils(), one_rings(mesh, boundary)
+        inner = {name: np.empty_like(values) for name, values in results.items()}
+        found = direct.evaluate(given, treated, scheme, inner)
+        # Others' rings are what they were, and a part of the mesh without poles gives these in the one pass.
+        differ = (np.sort(treated.ring[: given.n], axis=1) != np.sort(given.ring, axis=1)).any(axis=1)
+        others = np.flatnonzero(differ | (given.ring[:, 0] < 0))
+        found = found.of(others, given.n)
+        far = found._replace(vertices=others[found.vertices])
+        for name, values in inner.items():
+            results[name][others] = values[others]
+    elif others.size:
         inner = {name: np.empty(part.shape + direct.PER_VERTEX[name]) for name in results}
         treated = closed(part)[0] if boundary == "extrapolate" else part
         found = direct.evaluate(part, treated, scheme, inner).of(np.arange(others.size), part.n)
