@@ -26,6 +26,7 @@ SMOOTH = [
     ("catenoid", "grid", (12, 16, 24, 32), 7.7, 6e-9),
     ("torus", "grid", (12, 16, 24, 32), 7.7, 6e-9),
     ("dupin_cyclide", "grid", (12, 16, 24, 32), 7.5, 1e-5),
+    ("dupin_cyclide", "grid", (32, 64, 128), 6.2, 1e-9),
     ("ellipsoid", "grid", (12, 16, 24, 32), 7.7, 6e-9),
     ("cubed_ellipsoid", "faces", (16, 32, 64), 5.3, 1.4e-7),
 ]

@@ -34,7 +34,7 @@ def shuffled(grid, seed):
 
 
 def differences(mesh):
-    """H at all vertices, however good fits are."""
+    """H at all vertices, whatever fits claim."""
     around = MeshNeighbourhoods(mesh, "extrapolate")
     every = np.arange(around.wanted.size)
     found, H = lattice.differences(around, every, np.full(every.size, np.inf)), np.full(every.size, np.nan)
@@ -132,7 +132,7 @@ def test_polynomials_are_exact_up_to_the_corners():
     """Of a sheared and bent grid of a paraboloid, positions are of degree four in their numbers."""
     grid, exact = patch(14, lambda u, v: 0.6 * u * u - 0.3 * u * v)
     assert np.abs(differences(grid) - exact.ravel()).max() < 1e-11
-    assert np.abs(qc.mean_curvature(grid) - exact).max() < 1e-6  # there fits may be good enough
+    assert np.abs(qc.mean_curvature(grid) - exact).max() < 1e-11
     mesh, order = shuffled(grid, 3)
     assert np.abs(differences(mesh) - exact.ravel()[order]).max() < 1e-11
 
@@ -144,7 +144,8 @@ def test_order_eight_with_borders(faces):
         grid, exact = patch(n, lambda u, v: np.sin(2 * u) * np.cos(v))
         mesh, order = shuffled(grid, n) if faces else (grid, np.arange(n * n))
         errors.append(np.abs(differences(mesh) - exact.ravel()[order]).max())
-        assert np.abs(np.ravel(qc.mean_curvature(mesh)) - exact.ravel()[order]).max() < 2e-6
+        H = np.ravel(qc.mean_curvature(mesh))
+        assert np.abs(H - exact.ravel()[order]).max() < 2 * errors[-1]
     assert errors[-1] < 3e-8
     assert fitted_rate((16, 24, 32), errors) > 6.5  # seven at borders
 
@@ -252,8 +253,8 @@ def test_masked_grids_have_lines():
     found = qc.curvatures(qc.QuadGrid(grid.points, mask=mask))
     far = np.ones(grid.shape, bool)
     far[10:29, 10:31] = False
-    assert (found.degree[far] == LINES).mean() > 0.5
-    assert np.nanmax(np.abs(found.mean - exact)[far]) < 1e-6
+    assert (found.degree[far] == LINES).mean() > 0.9
+    assert np.nanmax(np.abs(found.mean - exact)[far]) < 1e-7
 
 
 def test_cells_have_lines():

@@ -30,6 +30,9 @@ from quadcurv.io.quads import quads_by_carrier, quads_by_order, split_quads
 from quadcurv.mesh import Recovery
 from quadcurv.repair import flip, orient
 
+# Points in any order make faces that fold over: what is told of them is tested elsewhere.
+pytestmark = pytest.mark.filterwarnings("ignore::quadcurv.ConsistencyWarning")
+
 
 def same_faces(one, other):
     """Whether two lists of faces are equal up to their order and the vertex that each begins with."""

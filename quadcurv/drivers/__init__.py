@@ -10,11 +10,12 @@ import scipy
 
 from quadcurv.boundary import checked_boundary, one_rings
 from quadcurv.drivers import blocks, compiled, device, direct, fits, outliers
-from quadcurv.drivers.answers import shapes
+from quadcurv.drivers.answers import shapes, telling
 from quadcurv.drivers.averages import averaged, checked_radius
 from quadcurv.drivers.fits import each
 from quadcurv.drivers.targets import IN_MEMORY, checked_out, targets
 from quadcurv.mesh import GridBlocks, Mesh, QuadGrid, QuadMesh, StaggeredGrid
+from quadcurv.precision import warn_of_rounding
 from quadcurv.schemes import Curvatures, Fit, Laplacian, Scheme
 from quadcurv.stencils import Stencils
 from quadcurv.types import Floats
@@ -48,19 +49,27 @@ def run(
 ) -> dict[str, Floats]:
     """Results by name (see `direct.PER_VERTEX`), into the arrays of `out` where there are any.
 
-    Where H may be far off for the rings of faces alone a warning says so if it is to `tell`.
+    Where the rounding of positions shows, and where H may be far off for the rings of faces alone, warnings
+    say so if it is to `tell`.
     """
     if device.holds(mesh):
-        return device.evaluate(mesh, scheme, wanted, boundary, out)  # type: ignore[arg-type]
-    checked_boundary(boundary)
-    results = arrays(mesh, scheme, wanted, out)
-    far = _evaluate(mesh, scheme, boundary, results)
-    if tell and scheme.fast is not None and not isinstance(mesh, GridBlocks) and not has_holes(mesh):
-        far = far.joined(outliers.far_off_inside(mesh, scheme, results))
-    if tell and far.vertices.size:
-        far.warn(f"{scheme.name}: H", mesh.shape if isinstance(mesh, QuadGrid) else mesh.stencils().shape)
-    if _of_cells(mesh) and "dual_areas" in results:
-        results["dual_areas"] *= _CELLS
+        far = direct.NOWHERE
+        results = device.evaluate(mesh, scheme, wanted, boundary, out)  # type: ignore[arg-type]
+    else:
+        checked_boundary(boundary)
+        results = arrays(mesh, scheme, wanted, out)
+        far = _evaluate(mesh, scheme, boundary, results)
+        if _of_cells(mesh) and "dual_areas" in results:
+            results["dual_areas"] *= _CELLS
+    if tell:
+        if (name := telling(results)) is not None:
+            warn_of_rounding(mesh, results[name])
+        if scheme.fast is not None and not (
+            device.holds(mesh) or isinstance(mesh, GridBlocks) or has_holes(mesh)
+        ):
+            far = far.joined(outliers.far_off_inside(mesh, scheme, results))
+        if far.vertices.size:
+            far.warn(f"{scheme.name}: H", mesh.shape if isinstance(mesh, QuadGrid) else mesh.stencils().shape)
     return results
 
 

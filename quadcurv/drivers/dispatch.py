@@ -29,8 +29,6 @@ def results(
         return parts.evaluate(mesh, wanted, scheme, boundary, out, progress)
     if isinstance(scheme, Laplacian):
         found = drivers.run(mesh, scheme, wanted, boundary, out, tell=True)
-        if (name := answers.telling(found)) is not None:
-            warn_of_rounding(mesh, found[name])
     else:
         if drivers.device.holds(mesh):
             drivers.device.checked_scheme(scheme)

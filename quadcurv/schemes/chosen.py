@@ -51,8 +51,7 @@ _NEAR, _INSIDE = 4, 3  # rings over which that is looked at, and rings to the bo
 _SMALLER = ((4, 2), (2, 1))
 _AT_ONCE = 2**13  # vertices that quadrics are fitted at
 _EXACT = 1e-3  # of the residuals of quadratic fits: all lie on one quadric
-# Errors, of the curvature, from which on others are asked, and below which nobody is.
-_DOUBT, _ENOUGH = 0.02, 1e-6
+_DOUBT = 0.02  # of the curvature, from which errors on others are asked
 _NEARLY_ALL, _MOST = 0.8, 0.5
 # Of an error, as much as another way must claim to be taken, and to be believed against it.
 _CLEARLY_LESS, _SURER = 0.3, 0.1
@@ -307,13 +306,12 @@ def _quadrics(around: Neighbourhoods, vertices: Indices, found: _Found) -> None:
 def _along_lines(around: Neighbourhoods, noisy: Bools, found: _Found) -> None:
     """Take differences along the lines of the mesh where these claim less error, and do not contradict.
 
-    Not amid noise, nor where the others are good enough.
+    Not amid noise, nor where errors are rounding.
     """
     kernel, before = found.kernel, found.errors()
     values, error = found.values, before[:, 0]
     with np.errstate(invalid="ignore"):
-        size = np.maximum(np.abs(values[:, kernel.K1]), np.abs(values[:, kernel.K2]))
-        asked = around.wanted & (error > np.maximum(_ENOUGH * size, around.rounding * values[:, kernel.GAIN]))
+        asked = around.wanted & (error > around.rounding * values[:, kernel.GAIN])
     if noisy.any():
         share = noisy.astype(np.float64)[:, None]
         for _ in range(_NEAR):
