@@ -238,8 +238,8 @@ def opening(records: Sequence[Record], quantity: str) -> list[str]:
     ]
     for s in found:
         lines.append(
-            f"| {s.mesh} | {s.peer} | {s.peer_error:.1e} | {s.default_error:.1e} | {s.ratio:.2f} | "
-            f"{word(s.ratio)} | {s.best} | {s.best_error:.1e} | {s.best_ratio:.2f} | {word(s.best_ratio)} |"
+            f"| {s.mesh} | {s.peer} | {s.peer_error:.1e} | {s.default_error:.1e} | {s.ratio:.3g} | "
+            f"{word(s.ratio)} | {s.best} | {s.best_error:.1e} | {s.best_ratio:.3g} | {word(s.best_ratio)} |"
         )
     return [*lines, "", verdict(found, lambda s: s.ratio, f"`{DEFAULT}`"), "",
             verdict(found, lambda s: s.best_ratio, "The best of our schemes, in hindsight,"), ""]  # fmt: skip

@@ -50,13 +50,13 @@ def differences(mesh):
 def test_weights_are_exact_for_polynomials(offset, k, degree):
     t = np.arange(9.0) - offset
     for power in range(degree + 1):
-        first, second = lattice._WEIGHTS[offset, k] @ t**power
+        first, second = lattice.weights()[offset, k] @ t**power
         scale = 9.0**power
         assert first == pytest.approx(float(power == 1), abs=1e-13 * scale)
         assert second == pytest.approx(2.0 * (power == 2), abs=1e-13 * scale)
     # The next one is not, but that second derivatives are better in the middle.
     inside = degree // 2 <= offset <= 8 - degree // 2
-    assert abs(lattice._WEIGHTS[offset, k, int(not inside)] @ t ** (degree + 1)) > 1.0
+    assert abs(lattice.weights()[offset, k, int(not inside)] @ t ** (degree + 1)) > 1.0
 
 
 def test_what_noise_is_in_the_highest_differences():

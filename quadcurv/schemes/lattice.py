@@ -12,6 +12,7 @@ Arrays of positions and their derivatives are (3, ...) here.
 from __future__ import annotations
 
 from collections.abc import Iterator
+from functools import cache
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -32,7 +33,8 @@ _AT_ONCE = 2**12  # vertices
 _PASSES, _AROUND, _FREEDOM = 3, 2, 20.0
 
 
-def _weights() -> Floats:
+@cache
+def weights() -> Floats:
     """(offset, degree, derivative, point): first and second derivatives at a point by those nearest to it."""
     out = np.zeros((_POINTS, len(_DEGREES), 2, _POINTS))
     for offset in range(_POINTS):
@@ -46,11 +48,6 @@ def _weights() -> Floats:
     return out
 
 
-_WEIGHTS = _weights()
-_ALL = _WEIGHTS.reshape(_POINTS, -1, _POINTS)
-_EIGHTH = np.broadcast_to(np.poly(np.ones(DEGREE)), (_POINTS, 1, _POINTS))
-_FIRST = np.concatenate((_WEIGHTS[:, -1, :1], _EIGHTH), axis=1)
-_LEAST_GAIN = np.linalg.norm(_WEIGHTS[_HALF, -1, 1]) / 2  # in H, times the square of the shorter edge
 # Each degree changes the entries of the shape operator by a like part of what the one before did, but where
 # one happens to change nothing: hence over so many rings, so many times that part, and H and the others by so
 # much of all entries at least.
@@ -154,7 +151,9 @@ def differences(around: Neighbourhoods, vertices: Indices, error: Floats) -> Dif
     """Curvatures of vertices on two long lines, where noise alone does not make H worse than `error`."""
     from quadcurv.kernels import jet as kernel
 
-    lines, n = around.lines, len(around.points)
+    lines, n, slopes = around.lines, len(around.points), weights()[:, -1, :1]
+    eighth = np.broadcast_to(np.poly(np.ones(DEGREE)), slopes.shape)
+    both = np.concatenate((slopes, eighth), axis=1)
     points, slope, rough = around.points.T.copy(), np.full((3, 2, n), np.nan), np.full((3, n), np.nan)
     on_lines = _on_long_lines(lines)
     vertices, error = vertices[on_lines[vertices]], error[on_lines[vertices]]
@@ -163,8 +162,8 @@ def differences(around: Neighbourhoods, vertices: Indices, error: Floats) -> Dif
         rough[:, at] = 0.0
         for axis in range(2):
             near = _windows(lines, axis, at)
-            slope[:, axis, at], eighth = _sums(_FIRST, near.offset, points.take(near.points, axis=1) - here)
-            rough[:, at] += eighth
+            slope[:, axis, at], last = _sums(both, near.offset, points.take(near.points, axis=1) - here)
+            rough[:, at] += last
     for _ in range(_PASSES):
         rough = rough - around.pooled(rough.T).T
     square = (dot(rough, rough) / 3)[:, None]
@@ -175,7 +174,8 @@ def differences(around: Neighbourhoods, vertices: Indices, error: Floats) -> Dif
     # The line of the longer edges comes first, whichever the numbering begins with: so parts give the same.
     edge2 = dot(slope, slope)
     first = np.argmax(edge2, axis=0)
-    found = vertices[noise[vertices] * _LEAST_GAIN < error * edge2.min(axis=0)[vertices]]
+    least = np.linalg.norm(weights()[_HALF, -1, 1]) / 2  # gain of H, times the square of the shorter edge
+    found = vertices[noise[vertices] * least < error * edge2.min(axis=0)[vertices]]
     # Column by column, as all results of fits lie.
     fits, change = np.full((kernel.COLUMNS, found.size), np.nan).T, np.full((n, 6), np.nan)
     fits[:, kernel.FREEDOM] = _FREEDOM
@@ -207,8 +207,9 @@ def _block(
     """Whether lines go on both ways; squares of what each degree changes; columns of a fit; its gains."""
     first, second, mixed, near = [], [], [], [_windows(lines, axis, at) for axis in axes]
     way = [lines.ways[lines.place[axis, at]] for axis in axes]
+    each = weights().reshape(_POINTS, -1, _POINTS)
     for axis, (on, ways, offset) in enumerate(near):
-        sums = _sums(_ALL, offset, points.take(on, axis=1) - points[:, at][:, None])
+        sums = _sums(each, offset, points.take(on, axis=1) - points[:, at][:, None])
         first.append(sums[0::2])
         second.append(sums[1::2])
         # Slopes of the lines across, which run the way that the vertex's own does, or against it.
@@ -216,7 +217,7 @@ def _block(
         line = across & 1
         along = np.where(lines.ways[lines.place[line, on]] == across, 1.0, -1.0)
         slopes = slope.reshape(3, -1).take(line * np.int64(slope.shape[2]) + on, axis=1) * along
-        mixed.append(_sums(_ALL[:, 0::2], offset, slopes))
+        mixed.append(_sums(each[:, 0::2], offset, slopes))
     left = np.where((way[1] - way[0]) & 3 == 1, 1.0, -1.0)  # counter-clockwise
     both = left * (mixed[0] + mixed[1]) / 2
     shapes, by = [], []
@@ -239,8 +240,9 @@ def _block(
 
 def _gains(by: Floats, cos: Floats, sin: Floats, sides: Any, first: Indices, second: Indices) -> Floats:
     """(4, k): of H, K, k1 and k2, to first order by the second derivatives alone."""
-    slope, bend = np.einsum("ojx,ojx->jo", _WEIGHTS[:, -1], _WEIGHTS[:, -1])
-    middle = _WEIGHTS[range(_POINTS), -1, 1, range(_POINTS)]
+    highest = weights()[:, -1]
+    slope, bend = np.einsum("ojx,ojx->jo", highest, highest)
+    middle = highest[range(_POINTS), 1, range(_POINTS)]
     s, f, g = sides
     parts, gains = [], []
     with np.errstate(divide="ignore", invalid="ignore"):
