@@ -46,7 +46,7 @@ ORDERS = [
 
 @pytest.mark.parametrize(("name", "layout", "jitter", "sizes", "rate", "bound"), ORDERS)
 def test_order(name, layout, jitter, sizes, rate, bound):
-    """In the inf-norm, borders, seams and vertices of valence 3 included; vertices moved along the surface."""
+    """In the inf-norm, borders, seams and vertices of valence 3 included; vertices moved along it."""
     errors = []
     for n in sizes:
         mesh, exact = sampled(name, n, jitter, layout)
