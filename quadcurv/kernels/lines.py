@@ -36,36 +36,37 @@ class Lines(NamedTuple):
 
 
 @kernel
-def _trace(links, n, vertices, ways, place, ends, closed):
+def _trace(onward, order, seen, ends):
     count, size = 0, 0
-    for axis in range(2):
-        for v in range(n):
-            if place[axis * n + v] >= 0 or (links[4 * v + axis] < 0 and links[4 * v + axis + 2] < 0):
-                continue
-            here, way, cycle = v, axis + 2, False
-            for turn in range(2):  # to the beginning, then along
-                while True:
-                    if turn == 1:
-                        vertices[size], ways[size] = here, way
-                        place[(way & 1) * n + here] = size
-                        size += 1
-                    there = links[4 * here + way]
-                    if there < 0:
-                        break
-                    back = -1
-                    for s in range(4):
-                        if links[4 * there + s] == here:
-                            back = s
-                    if back < 0 or place[(back & 1) * n + there] >= 0:
-                        break
-                    here, way = there, (back + 2) & 3
-                    if turn == 0 and here == v and (way & 1) == axis:
-                        cycle = True
-                        break
-                way = (way + 2) & 3
-            ends[count], closed[count] = size, cycle
-            count += 1
-    return count, size
+    for first in range(onward.size):
+        if seen[first & -3] or (onward[first] < 0 and onward[first ^ 2] < 0):
+            continue
+        s = first ^ 2  # back to the beginning, if there is one
+        while onward[s] >= 0 and onward[s] != first ^ 2:
+            s = onward[s]
+        s = s ^ 2
+        while s >= 0 and not seen[s & -3]:
+            order[size] = s
+            seen[s & -3] = True
+            size += 1
+            s = onward[s]
+        ends[count] = size
+        count += 1
+    return count
+
+
+def _onward(links):
+    """(4 n,): from slot w of vertex v, as 4 v + w, to that which goes on at the next vertex; -1 at ends."""
+    n = len(links)
+    onward, vertices = np.full((n, 4), -1), np.arange(n)
+    for way in range(4):
+        there = links[:, way].astype(np.int64)
+        back = links[there] == vertices[:, None]
+        known = (there >= 0) & (back.sum(axis=1) == 1)
+        onward[known, way] = (4 * there + (back.argmax(axis=1) ^ 2))[known]
+    onward = onward.reshape(-1)
+    here = np.arange(4 * n)
+    return np.where(onward[onward ^ 2] == here ^ 2, onward, -1)  # one may not lead back
 
 
 def lines(links):
@@ -74,10 +75,11 @@ def lines(links):
     -1 where there is none.
     """
     n = len(links)
-    vertices, ways, place = np.empty(2 * n, np.int32), np.empty(2 * n, np.int8), np.full((2, n), -1)
-    ends, closed = np.empty(2 * n, np.int64), np.empty(2 * n, bool)
-    count, size = _trace(flat(links), n, vertices, ways, place.reshape(-1), ends, closed)
-    end = ends[:count]
+    onward, order, ends = _onward(links), np.empty(2 * n, np.int64), np.empty(2 * n, np.int64)
+    end = ends[: _trace(flat(onward), order, np.zeros(4 * n, bool), ends)]
     begin = np.append(0, end)[:-1]
-    line = np.repeat(np.arange(count), end - begin)
-    return Lines(vertices[:size], ways[:size], place, line, begin, end, closed[:count])
+    order = order[: end[-1] if end.size else 0]
+    vertices, ways, place = (order >> 2).astype(np.int32), (order & 3).astype(np.int8), np.full((2, n), -1)
+    place[order & 1, vertices] = np.arange(order.size)
+    line, closed = np.repeat(np.arange(end.size), end - begin), onward[order[end - 1]] == order[begin]
+    return Lines(vertices, ways, place, line, begin, end, closed)
