@@ -9,9 +9,6 @@ from scripts import assert_as_declared, assert_one_size_of_type, drawn
 from comparisons import common, functions
 from quadcurv.schemes import SCHEMES, Laplacian
 
-# Points in any order make faces that fold over: what is told of them is tested elsewhere.
-pytestmark = pytest.mark.filterwarnings("ignore::quadcurv.ConsistencyWarning")
-
 
 @pytest.fixture(scope="module")
 def found():
