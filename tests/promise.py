@@ -233,7 +233,7 @@ def uneven_border(s, rng):
         moved.points,
         lambda x: qc.QuadGrid(x, s.surface.wrap),
         moved.H,
-        explained=0.1 * s.bend**2 * s.edge,
+        explained=0.11 * s.bend**2 * s.edge,  # jets on the even mesh have no error to add
     )
 
 
