@@ -126,15 +126,15 @@ def made(jet=1.0, peer=2.0):
 def test_words_follow_from_the_numbers():
     """A spoilt number takes the word with it, in the row and in the sentence."""
     text = "\n".join(peers.opening(made(), "H"))
-    assert "| smooth | VTK | 2.0e+00 | 1.0e+00 | 2.00 | first | jet | 1.0e+00 | 2.00 | first |" in text
+    assert "| smooth | VTK | 2.0e+00 | 1.0e+00 | 2 | first | jet | 1.0e+00 | 2 | first |" in text
     assert "`jet` is first on 1 of 2 meshes, equal to the best peer on 1 (fillet)." in text
     spoilt = "\n".join(peers.opening(made(jet=2.5), "H"))
-    assert "| smooth | VTK | 2.0e+00 | 2.5e+00 | 0.80 | behind | liu | 1.5e+00 | 1.33 | first |" in spoilt
+    assert "| smooth | VTK | 2.0e+00 | 2.5e+00 | 0.8 | behind | liu | 1.5e+00 | 1.33 | first |" in spoilt
     assert "`jet` is first on 0 of 2 meshes" in spoilt
     assert "and not first on 1: smooth." in spoilt
     assert "The best of our schemes, in hindsight, is first on 1 of 2 meshes" in spoilt
     better = "\n".join(peers.opening(made(peer=0.5), "k"))
-    assert "| smooth | VTK | 5.0e-01 | 1.0e+00 | 0.50 | behind |" in better
+    assert "| smooth | VTK | 5.0e-01 | 1.0e+00 | 0.5 | behind |" in better
 
 
 def test_choice_follows_from_the_numbers():
