@@ -150,9 +150,11 @@ class MeshNeighbourhoods:
             normals[kept] = faces.normals[at[kept]]
         return out, normals
 
-    def pooled(self, values: Floats) -> Floats:
+    def pooled(self, values: Floats, times: int = 1) -> Floats:
         """(n, k): see `Neighbourhoods`."""
-        return self._faces.means(values)
+        for _ in range(times):
+            values = self._faces.means(values)
+        return values
 
     @property
     def points(self) -> Floats:

@@ -213,6 +213,5 @@ def spread(around: Neighbourhoods, vertices: Indices, values: Floats, rings: int
     if vertices.size < around.wanted.size:
         whole = np.full((around.wanted.size, values.shape[1]), np.nan)
         whole[vertices] = values
-    for _ in range(rings):
-        whole = around.pooled(whole)
+    whole = around.pooled(whole, rings)
     return whole if vertices.size == len(whole) else whole[vertices]

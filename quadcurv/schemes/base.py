@@ -255,8 +255,8 @@ class Neighbourhoods(Protocol):
         NaN elsewhere.
         """
 
-    def pooled(self, values: Floats) -> Floats:
-        """Means of values (n, k) over vertices and their neighbours, of those that are known."""
+    def pooled(self, values: Floats, times: int = 1) -> Floats:
+        """Means of values (n, k) over vertices and their neighbours, of known ones, taken so often."""
 
     def positions(self, vertices: Indices, rings: int, ghosts: bool = True) -> tuple[Floats, Floats]:
         """Positions around vertices (k,), for fits written in numpy.

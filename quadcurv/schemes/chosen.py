@@ -162,9 +162,7 @@ class _Found:
     def intervals(self) -> Floats:
         """(n, 4): the same, residuals being noise as far as they also move surfaces off their vertices."""
         kernel, around, out = self.kernel, self.around, self.errors()
-        inside = around.on_border.astype(np.float64)[:, None]
-        for _ in range(_INSIDE):
-            inside = around.pooled(inside)
+        inside = around.pooled(around.on_border.astype(np.float64)[:, None], _INSIDE)
         gain = self.values[:, kernel.GAIN : kernel.GAIN + 4]
         # What ghosts are off by shows in no residual.
         at = np.flatnonzero(self.is_smooth & (self.rings <= 3) & (around.ghost_error > 0))
@@ -175,8 +173,7 @@ class _Found:
         gain = gain[at]
         off = np.full((len(out), 1), np.nan)
         off[at, 0] = (self.values[at, kernel.BIAS] / gain[:, 0]) ** 2
-        for _ in range(_NEAR):
-            off = around.pooled(off)
+        off = around.pooled(off, _NEAR)
         sigma = np.fmin(self.sigma[at, None], _SEEN * np.sqrt(off[at]))
         noise = self._quantile(at)[:, None] * gain * sigma
         out[at] = np.hypot(np.nan_to_num(noise), self.bias[at])
@@ -313,9 +310,7 @@ def _along_lines(around: Neighbourhoods, noisy: Bools, found: _Found) -> None:
     with np.errstate(invalid="ignore"):
         asked = around.wanted & (error > around.rounding * values[:, kernel.GAIN])
     if noisy.any():
-        share = noisy.astype(np.float64)[:, None]
-        for _ in range(_NEAR):
-            share = around.pooled(share)
+        share = around.pooled(noisy.astype(np.float64)[:, None], _NEAR)
         asked &= ~(noisy & (share[:, 0] > _NEARLY_ALL))
     vertices, other = np.flatnonzero(asked), _Found(around)
     if vertices.size == 0:

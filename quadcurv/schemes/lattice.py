@@ -111,19 +111,17 @@ def _near(around: Neighbourhoods, vertices: Indices) -> Bools:
     """(n,): whose lines vertices on long lines ask for, at least."""
     if 2 * vertices.size > len(around.points):
         return np.ones(len(around.points), bool)
-    near = np.zeros(len(around.points))
+    near = np.zeros((len(around.points), 1))
     near[vertices] = 1.0
-    for _ in range(_PASSES + _AROUND):
-        near = around.pooled(near[:, None])[:, 0]
-    asked = near > 0
+    asked = around.pooled(near, _PASSES + _AROUND)[:, 0] > 0
     for axis in range(2):
         asked[_windows(around.lines, axis, vertices).points] = True
     return asked
 
 
-def _blocks(vertices: Indices) -> Iterator[Indices]:
+def _blocks(vertices: Indices) -> Iterator[slice]:
     for start in range(0, vertices.size, _AT_ONCE):
-        yield vertices[start : start + _AT_ONCE]
+        yield slice(start, start + _AT_ONCE)
 
 
 class Differences(NamedTuple):
@@ -157,7 +155,9 @@ def differences(around: Neighbourhoods, vertices: Indices, error: Floats) -> Dif
     points, slope, rough = around.points.T.copy(), np.full((3, 2, n), np.nan), np.full((3, n), np.nan)
     on_lines = _on_long_lines(lines)
     vertices, error = vertices[on_lines[vertices]], error[on_lines[vertices]]
-    for at in _blocks(np.flatnonzero(on_lines & _near(around, vertices))):
+    long = np.flatnonzero(on_lines & _near(around, vertices))
+    for block in _blocks(long):
+        at = long[block]
         here = points[:, at][:, None]
         rough[:, at] = 0.0
         for axis in range(2):
@@ -166,9 +166,7 @@ def differences(around: Neighbourhoods, vertices: Indices, error: Floats) -> Dif
             rough[:, at] += last
     for _ in range(_PASSES):
         rough = rough - around.pooled(rough.T).T
-    square = (dot(rough, rough) / 3)[:, None]
-    for _ in range(_AROUND):
-        square = around.pooled(square)
+    square = around.pooled((dot(rough, rough) / 3)[:, None], _AROUND)
     noise = np.sqrt(square[:, 0] / _OF_NOISE)
 
     # The line of the longer edges comes first, whichever the numbering begins with: so parts give the same.
@@ -180,15 +178,13 @@ def differences(around: Neighbourhoods, vertices: Indices, error: Floats) -> Dif
     fits, change = np.full((kernel.COLUMNS, found.size), np.nan).T, np.full((n, 6), np.nan)
     fits[:, kernel.FREEDOM] = _FREEDOM
     middle = np.zeros(n, bool)
-    for start in range(0, found.size, _AT_ONCE):
-        at, out = found[start : start + _AT_ONCE], fits[start : start + _AT_ONCE].T
+    for block in _blocks(found):
+        at, out = found[block], fits[block].T
         middle[at], change[at], out[: kernel.NORMAL.stop], out[kernel.GAIN : kernel.GAIN + 4] = _block(
             points, lines, slope, at, (first[at], 1 - first[at])
         )
     # Near the ends of lines errors are tens of times as large, row by row: there nobody else's count.
-    inside = np.where(middle[:, None], change, np.nan)
-    for _ in range(_WIDE):
-        inside = around.pooled(inside)
+    inside = around.pooled(np.where(middle[:, None], change, np.nan), _WIDE)
     change = np.where(middle[:, None], inside, change)
     before, behind, *each = np.sqrt(change[found]).T
     larger = np.abs(fits[:, kernel.K1 : kernel.K2 + 1]).max(axis=1)
