@@ -10,7 +10,6 @@ import numpy as np
 from quadcurv import drivers
 from quadcurv.boundary import one_rings
 from quadcurv.drivers import parts
-from quadcurv.drivers.direct import FarOff
 from quadcurv.drivers.dispatch import as_fit, fitted, results, split, taken
 from quadcurv.mesh import ChunkedGrid, GridBlocks
 from quadcurv.schemes import Curvatures, Fit, Scheme, SchemeName, as_scheme
@@ -262,7 +261,7 @@ def gaussian_curvature(
     stencils = one_rings(mesh, boundary)
     # On triangles as skew as make the cotan formula far off angles tell no curvature either.
     K = angle_gaussian_curvature(stencils)
-    far = FarOff(*far_off(stencils, _COTAN)).known(K)
+    far = far_off(stencils, _COTAN).known(K)
     place = np.flatnonzero(mesh.in_shape(np.ones(stencils.n, bool)))
     far._replace(vertices=place[far.vertices]).warn(
         "angle_defect: K, as H by cotan-6,", mesh.in_shape(K).shape

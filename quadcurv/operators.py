@@ -10,7 +10,6 @@ from numpy.typing import ArrayLike
 
 from quadcurv import drivers
 from quadcurv.drivers import parts
-from quadcurv.drivers.direct import FarOff
 from quadcurv.drivers.dispatch import as_laplacian, results, split, taken
 from quadcurv.io import as_mesh
 from quadcurv.mesh import ChunkedGrid, GridBlocks, StaggeredGrid
@@ -178,7 +177,7 @@ def laplace_beltrami(mesh: Any, f: ArrayLike, scheme: SchemeName | str | Scheme 
         raise ValueError(f"f: shape {given.shape}, expected {lead} or {(*lead, 'k')}")
     values = given.reshape(len(stencils.points), *given.shape[len(lead) :])
     result = drivers.apply(mesh, chosen, values)
-    FarOff(*far_off(stencils, chosen)).known(result).warn(f"{chosen.name}: the operator", stencils.shape)
+    far_off(stencils, chosen).known(result).warn(f"{chosen.name}: the operator", stencils.shape)
     return split(mesh, result.reshape(*stencils.shape, *values.shape[1:]))
 
 

@@ -96,11 +96,16 @@ def warn_of_error(error: float, extent: float, roundoff: float, H: Floats) -> No
         )
 
 
+def some(values: Floats, most: int) -> Floats:
+    """Evenly, at most so many or a few more of all values; of vectors each coordinate in turn."""
+    values = values.reshape(-1)
+    every = values.size // most + 1
+    return values[:: every + (every % 3 == 0)]
+
+
 def typical(H: Floats, extent: float) -> float:
     """Median size of the mean curvature, of some of its values, or 1 / extent where that is larger."""
-    values = H.reshape(-1)
-    every = values.size // _VALUES + 1
-    H = on_host(values[:: every + (every % 3 == 0)])  # of vectors each coordinate in turn
+    H = on_host(some(H, _VALUES))
     known = np.abs(H[np.isfinite(H)])
     return max(float(np.median(known)) if known.size else 0.0, 1 / extent)
 

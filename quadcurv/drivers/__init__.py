@@ -17,6 +17,7 @@ from quadcurv.drivers.targets import IN_MEMORY, checked_out, targets
 from quadcurv.mesh import GridBlocks, Mesh, QuadGrid, QuadMesh, StaggeredGrid
 from quadcurv.precision import warn_of_rounding
 from quadcurv.schemes import Curvatures, Fit, Laplacian, Scheme
+from quadcurv.schemes.consistency import NOWHERE, FarOff
 from quadcurv.stencils import Stencils
 from quadcurv.types import Floats
 
@@ -53,7 +54,7 @@ def run(
     say so if it is to `tell`.
     """
     if device.holds(mesh):
-        far = direct.NOWHERE
+        far = NOWHERE
         results = device.evaluate(mesh, scheme, wanted, boundary, out)  # type: ignore[arg-type]
     else:
         checked_boundary(boundary)
@@ -75,11 +76,11 @@ def run(
 
 def _evaluate(
     mesh: Mesh | GridBlocks, scheme: Laplacian, boundary: str, results: dict[str, Floats]
-) -> direct.FarOff:
+) -> FarOff:
     """Write results; where H may be far off."""
     if isinstance(mesh, GridBlocks):
         blocks.evaluate(mesh, scheme, boundary, results)
-        return direct.NOWHERE
+        return NOWHERE
     if has_holes(mesh):
         inner, known = mesh.to_mesh(), np.flatnonzero(~np.asarray(mesh.mask))
         found = arrays(inner, scheme, results)

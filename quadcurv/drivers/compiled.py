@@ -25,6 +25,7 @@ from quadcurv.device_arrays import taken
 from quadcurv.drivers import direct
 from quadcurv.mesh import QuadGrid, QuadMesh, StaggeredGrid
 from quadcurv.schemes import Diamond, Laplacian
+from quadcurv.schemes.consistency import NOWHERE, FarOff
 from quadcurv.stencils import Frame, Stencils, coarse
 from quadcurv.types import Floats, Indices, Ints
 
@@ -36,9 +37,7 @@ _NOTHING = np.empty(0)  # a result that nobody wants
 _CLOSED = Frame(_NOTHING, _NOTHING)  # what is beyond a grid is its other side
 
 
-def evaluate_faces(
-    mesh: QuadMesh, scheme: Laplacian, boundary: str, results: Mapping[str, Floats]
-) -> direct.FarOff:
+def evaluate_faces(mesh: QuadMesh, scheme: Laplacian, boundary: str, results: Mapping[str, Floats]) -> FarOff:
     """Regular vertices in one pass, the others from the stencils of the part of the mesh around them.
 
     Of those others, where H may be far off.
@@ -46,25 +45,16 @@ def evaluate_faces(
     assert scheme.fast is not None
     others, part = mesh.irregular_part()
     _evaluate_rings(mesh, scheme.fast, results)
-    far = direct.NOWHERE
+    far = NOWHERE
     if others.size and poles_of_faces(part) is not None:  # rare: all of it the slow way, too
         given, treated = mesh.stencils(), one_rings(mesh, boundary)
-        inner = {name: np.empty_like(values) for name, values in results.items()}
-        found = direct.evaluate(given, treated, scheme, inner)
         # Others' rings are what they were, and a part of the mesh without poles gives these in the one pass.
         differ = (np.sort(treated.ring[: given.n], axis=1) != np.sort(given.ring, axis=1)).any(axis=1)
         others = np.flatnonzero(differ | (given.ring[:, 0] < 0))
-        found = found.of(others, given.n)
-        far = found._replace(vertices=others[found.vertices])
-        for name, values in inner.items():
-            results[name][others] = values[others]
+        far = _fill(results, others, given, treated, scheme, others)
     elif others.size:
-        inner = {name: np.empty(part.shape + direct.PER_VERTEX[name]) for name in results}
         treated = closed(part)[0] if boundary == "extrapolate" else part
-        found = direct.evaluate(part, treated, scheme, inner).of(np.arange(others.size), part.n)
-        far = found._replace(vertices=others[found.vertices])
-        for name, values in inner.items():
-            results[name][others] = values[: others.size]
+        far = _fill(results, others, part, treated, scheme, np.arange(others.size))
     if not mesh.orientable and "mean_curvature" in results:
         np.abs(results["mean_curvature"], out=results["mean_curvature"])
     return far
@@ -72,7 +62,7 @@ def evaluate_faces(
 
 def evaluate_grid(
     grid: QuadGrid | StaggeredGrid, scheme: Laplacian, boundary: str, results: Mapping[str, Floats]
-) -> direct.FarOff:
+) -> FarOff:
     """All in one pass, save along open sides: what is cut off there, and rings that ghosts by index miss.
 
     Of those, where H may be far off.
@@ -80,7 +70,7 @@ def evaluate_grid(
     assert scheme.fast is not None
     unserved = evaluate_rows(grid, scheme.fast, boundary, results)
     if all(grid.wrap) or (isinstance(grid, StaggeredGrid) and grid.has_ghosts):
-        return direct.NOWHERE
+        return NOWHERE
     found = []
     if isinstance(grid, QuadGrid):
         for vertices, part, beside in parts_at_poles(grid):
@@ -92,12 +82,12 @@ def evaluate_grid(
     cut = {"dual_areas"} if boundary == "extrapolate" else {"dual_areas", "vertex_normals"}
     if cut & results.keys():
         _evaluate_sides(grid, scheme, {name: results[name] for name in cut & results.keys()})
-    return direct.FarOff._make(map(np.concatenate, zip(direct.NOWHERE, *found, strict=True)))
+    return FarOff._make(map(np.concatenate, zip(NOWHERE, *found, strict=True)))
 
 
 def _evaluate_part(
     grid: QuadGrid | StaggeredGrid, others: Indices, scheme: Laplacian, results: Mapping[str, Floats]
-) -> direct.FarOff:
+) -> FarOff:
     """Vertices that the frame of a grid does not serve, from the stencils of a part around them."""
     if isinstance(grid, QuadGrid):
         given, place = part_around(grid, others, REACH)[1], np.arange(others.size)
@@ -114,8 +104,8 @@ def _fill(
     treated: Stencils,
     scheme: Laplacian,
     place: Indices,
-) -> direct.FarOff:
-    """Give some vertices of a grid the results at some places in other stencils."""
+) -> FarOff:
+    """Give some vertices of a mesh the results at some places in other stencils."""
     inner = {name: np.empty(given.shape + direct.PER_VERTEX[name]) for name in results}
     far = direct.evaluate(given, treated, scheme, inner).of(place, given.n)
     for name, values in inner.items():

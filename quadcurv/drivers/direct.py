@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import NamedTuple
 
 import numpy as np
 import scipy
 
 from quadcurv.schemes import Laplacian
 from quadcurv.schemes.assembly import ring_areas
-from quadcurv.schemes.consistency import far_off
+from quadcurv.schemes.consistency import NOWHERE, FarOff, far_off
 from quadcurv.stencils import Stencils
-from quadcurv.types import ConsistencyWarning, Floats, Indices, warn
+from quadcurv.types import Floats
 
 PER_VERTEX: dict[str, tuple[int, ...]] = {
     "mean_curvature": (),
@@ -21,57 +20,6 @@ PER_VERTEX: dict[str, tuple[int, ...]] = {
     "dual_areas": (),
 }
 """What can be asked for, and the shape of one vertex's answer."""
-
-
-class FarOff(NamedTuple):
-    """Vertices, flat, where H of a scheme may be far off for their rings, and by how much."""
-
-    vertices: Indices
-    off: Floats
-
-    def of(self, place: Indices, n: int) -> FarOff:
-        """Those of some places (k,) among n, as the k."""
-        row = np.full(n, -1)
-        row[place] = np.arange(place.size)
-        at = row[self.vertices]
-        return FarOff(at[at >= 0], self.off[at >= 0])
-
-    def known(self, values: Floats) -> FarOff:
-        """Those where values (n, ...) are finite."""
-        kept = np.isfinite(values.reshape(len(values), -1)[self.vertices]).all(axis=1)
-        return FarOff(self.vertices[kept], self.off[kept])
-
-    def joined(self, other: FarOff) -> FarOff:
-        """Both."""
-        return FarOff(np.concatenate((self.vertices, other.vertices)), np.concatenate((self.off, other.off)))
-
-    def warn(self, name: str, shape: tuple[int, ...]) -> None:
-        """Name the first one, and how many there are, and what is off.
-
-        Warns
-        -----
-        ConsistencyWarning
-        """
-        if not self.vertices.size:
-            return
-        first = tuple(map(int, np.unravel_index(self.vertices.min(), shape)))
-        folds = np.count_nonzero(np.isinf(self.off))
-        said = []
-        if folds < self.off.size:
-            said.append(
-                f"by up to {self.off[np.isfinite(self.off)].max():.2g} times the larger principal curvature "
-                f"at {self.off.size - folds} vertices of faces too skew or too thin for it"
-            )
-        if folds:
-            said.append(f"by any amount at {folds} vertices whose faces fold over each other or have no area")
-        warn(
-            f"{name} may be off {' and '.join(said)}, first vertex {first if len(first) > 1 else first[0]}; "
-            "'jet' does not depend on faces",
-            ConsistencyWarning,
-        )
-
-
-NOWHERE = FarOff(np.empty(0, np.int64), np.empty(0))
 
 
 def evaluate(given: Stencils, treated: Stencils, scheme: Laplacian, results: Mapping[str, Floats]) -> FarOff:
@@ -94,7 +42,7 @@ def evaluate(given: Stencils, treated: Stencils, scheme: Laplacian, results: Map
     if "mean_curvature" in results:
         H = -np.einsum("ix,ix->i", Hn, normals)
         results["mean_curvature"][...] = (H if treated.orientable else np.abs(H)).reshape(treated.shape)
-    return FarOff(*far_off(treated, scheme)).known(Hn)
+    return far_off(treated, scheme).known(Hn)
 
 
 def flux_and_area(stencils: Stencils, scheme: Laplacian) -> tuple[Floats, Floats]:

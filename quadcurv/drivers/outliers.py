@@ -8,11 +8,10 @@ import numpy as np
 
 from quadcurv.boundary import part_around
 from quadcurv.drivers.answers import telling
-from quadcurv.drivers.direct import NOWHERE, FarOff
 from quadcurv.mesh import Mesh, QuadGrid
-from quadcurv.precision import rounding_error, typical
+from quadcurv.precision import rounding_error, some, typical
 from quadcurv.schemes import Laplacian
-from quadcurv.schemes.consistency import around, far_off
+from quadcurv.schemes.consistency import NOWHERE, FarOff, around, far_off
 from quadcurv.types import Floats
 
 _VALUES = 2**14  # of H, by which it is seen whether any stand out: all would take a fifth of a pass
@@ -25,9 +24,7 @@ def far_off_inside(mesh: Mesh, scheme: Laplacian, results: Mapping[str, Floats])
     if name is None:
         return NOWHERE
     H, extent = results[name], rounding_error(mesh)[1]
-    every = H.size // _VALUES + 1
-    # Of vectors each coordinate in turn; NaN is passed over.
-    most = np.fmax.reduce(np.abs(H.reshape(-1)[:: every + (every % 3 == 0)]), initial=0.0)
+    most = np.fmax.reduce(np.abs(some(H, _VALUES)), initial=0.0)  # NaN is passed over
     if most * extent < _OUTSTANDING or not extent > 0:
         return NOWHERE
     H = np.abs(H.reshape(-1) if name == "mean_curvature" else np.abs(H.reshape(-1, 3)).max(axis=1))

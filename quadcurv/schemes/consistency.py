@@ -8,15 +8,68 @@ may be off, whatever the surface, the ring being what it is.
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 from quadcurv.schemes.base import Laplacian
 from quadcurv.stencils import Stencils
-from quadcurv.types import Bools, Floats, Indices
+from quadcurv.types import Bools, ConsistencyWarning, Floats, Indices, warn
 
 FAR = 3.0  # times the larger principal curvature: jitter of 30 % of the spacing makes H as far off
 FAR_ANYHOW = 6.0  # of a scheme that converges on no skew mesh
 _SLIVER = 0.25  # faces beyond that, see `kernels.slivers`, are not as bad
+
+
+class FarOff(NamedTuple):
+    """Vertices, flat, where H of a scheme may be far off for their rings, and by how much."""
+
+    vertices: Indices
+    off: Floats
+
+    def of(self, place: Indices, n: int) -> FarOff:
+        """Those of some places (k,) among n, as the k."""
+        row = np.full(n, -1)
+        row[place] = np.arange(place.size)
+        at = row[self.vertices]
+        return FarOff(at[at >= 0], self.off[at >= 0])
+
+    def known(self, values: Floats) -> FarOff:
+        """Those where values (n, ...) are finite."""
+        kept = np.isfinite(values.reshape(len(values), -1)[self.vertices]).all(axis=1)
+        return FarOff(self.vertices[kept], self.off[kept])
+
+    def joined(self, other: FarOff) -> FarOff:
+        """Both."""
+        return FarOff(np.concatenate((self.vertices, other.vertices)), np.concatenate((self.off, other.off)))
+
+    def warn(self, name: str, shape: tuple[int, ...]) -> None:
+        """Name the first one, and how many there are, and what is off.
+
+        Warns
+        -----
+        ConsistencyWarning
+        """
+        if not self.vertices.size:
+            return
+        first = tuple(map(int, np.unravel_index(self.vertices.min(), shape)))
+        folds = np.count_nonzero(np.isinf(self.off))
+        said = []
+        if folds < self.off.size:
+            said.append(
+                f"by up to {self.off[np.isfinite(self.off)].max():.2g} times the larger principal curvature "
+                f"at {self.off.size - folds} vertices of faces too skew or too thin for it"
+            )
+        if folds:
+            said.append(f"by any amount at {folds} vertices whose faces fold over each other or have no area")
+        warn(
+            f"{name} may be off {' and '.join(said)}, first vertex {first if len(first) > 1 else first[0]}; "
+            "'jet' does not depend on faces",
+            ConsistencyWarning,
+        )
+
+
+NOWHERE = FarOff(np.empty(0, np.int64), np.empty(0))
 
 
 def consistency(stencils: Stencils, scheme: Laplacian, vertices: Indices | None = None) -> Floats:
@@ -62,7 +115,7 @@ def consistency(stencils: Stencils, scheme: Laplacian, vertices: Indices | None 
     return sizes
 
 
-def far_off(stencils: Stencils, scheme: Laplacian) -> tuple[Indices, Floats]:
+def far_off(stencils: Stencils, scheme: Laplacian) -> FarOff:
     """Vertices where H of a scheme may be far off for their rings, and by how much: see `consistency`.
 
     Infinite where faces fold over each other, and in rings without area: these are none of a surface over a
@@ -78,7 +131,7 @@ def far_off(stencils: Stencils, scheme: Laplacian) -> tuple[Indices, Floats]:
         without_area = np.isnan(found) & ~stencils.ring_areas[vertices].any(axis=1)
         off[vertices] = np.where(without_area, np.inf, np.nan_to_num(found))
     far = np.flatnonzero(off > (FAR if scheme.order > 0 else FAR_ANYHOW))
-    return far, off[far]
+    return FarOff(far, off[far])
 
 
 def folded(stencils: Stencils) -> Bools:
