@@ -62,13 +62,11 @@ def run(
         far = _evaluate(mesh, scheme, boundary, results)
         if _of_cells(mesh) and "dual_areas" in results:
             results["dual_areas"] *= _CELLS
+        if tell and scheme.fast is not None and not (isinstance(mesh, GridBlocks) or has_holes(mesh)):
+            far = far.joined(outliers.far_off_inside(mesh, scheme, results))
     if tell:
         if (name := telling(results)) is not None:
             warn_of_rounding(mesh, results[name])
-        if scheme.fast is not None and not (
-            device.holds(mesh) or isinstance(mesh, GridBlocks) or has_holes(mesh)
-        ):
-            far = far.joined(outliers.far_off_inside(mesh, scheme, results))
         if far.vertices.size:
             far.warn(f"{scheme.name}: H", mesh.shape if isinstance(mesh, QuadGrid) else mesh.stencils().shape)
     return results

@@ -74,11 +74,10 @@ def _curvatures(around: Neighbourhoods, order: int) -> Curvatures:
         return sliding_window_view(along, order + 1, 1) @ _WEIGHTS[order][j]
 
     orders = (1, 0), (0, 1), (2, 0), (1, 1), (0, 2)
-    (a, b, c), (e1, e2, normal), _ = shape_operator(*(derivative(*o).reshape(-1, 3).T for o in orders))
-    angle = np.arctan2(b, (a - c) / 2) / 2
-    cos, sin = np.cos(angle), np.sin(angle)
+    shape, (e1, e2, normal), _ = shape_operator(*(derivative(*o).reshape(-1, 3).T for o in orders))
+    cos, sin = principal(*shape)
     return Curvatures(
-        *invariants(a, b, c), (cos * e1 + sin * e2).T, (cos * e2 - sin * e1).T, np.ascontiguousarray(normal.T)
+        *invariants(*shape), (cos * e1 + sin * e2).T, (cos * e2 - sin * e1).T, np.ascontiguousarray(normal.T)
     )
 
 
@@ -111,6 +110,12 @@ def invariants(a: Floats, b: Floats, c: Floats) -> tuple[Floats, Floats, Floats,
     """H, K, k1 and k2 of ((a, b), (b, c))."""
     H, root = (a + c) / 2, np.hypot((a - c) / 2, b)
     return H, a * c - b * b, H + root, H - root
+
+
+def principal(a: Floats, b: Floats, c: Floats) -> tuple[Floats, Floats]:
+    """Cosine and sine of the direction of k1 of ((a, b), (b, c))."""
+    angle = np.arctan2(b, (a - c) / 2) / 2
+    return np.cos(angle), np.sin(angle)
 
 
 def dot(x: Floats, y: Floats) -> Floats:

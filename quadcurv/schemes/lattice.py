@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from quadcurv.schemes.base import Neighbourhoods
-from quadcurv.schemes.fundamental_forms import dot, invariants, shape_operator
+from quadcurv.schemes.fundamental_forms import dot, invariants, principal, shape_operator
 from quadcurv.types import Bools, Floats, Indices, Ints
 
 if TYPE_CHECKING:
@@ -222,9 +222,7 @@ def _block(
         shape, frame, sides = shape_operator(X1, X2, second[0][k], both[k], second[1][k])
         shapes.append(np.stack(shape))
         by.append(np.stack(invariants(*shape)))
-    (a, b, c), (e1, e2, normal) = shape, frame
-    angle = np.arctan2(b, (a - c) / 2) / 2
-    cos, sin = np.cos(angle), np.sin(angle)
+    (e1, e2, normal), (cos, sin) = frame, principal(*shape)
     directions = cos * e1 + sin * e2, cos * e2 - sin * e1
     less, more = np.diff(shapes, axis=0)
     entries = [x[0] ** 2 + 2 * x[1] ** 2 + x[2] ** 2 for x in (less, more)]
